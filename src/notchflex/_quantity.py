@@ -60,7 +60,8 @@ class Quantity:
             last.
         in_world: Whether the formula's vectors or rotations, which are in the frame of the base,
             are turned into the world.
-        optional: Whether it is left out of files where no entry of a path holds a number.
+        optional: Tells which entries of a step a path has, by its robot and loads and never by its
+            results; where it has none the quantity is left out of files. None where all have all.
         kind: What an entry is: `float`, `bool`, `int` or `str`.
         work_of: Names of the force and the length that it is the work of, if it is one; batches
             integrate them too.
@@ -77,7 +78,7 @@ class Quantity:
     per: tuple[str, ...] = ()
     after: str | None = None
     in_world: bool = False
-    optional: bool = False
+    optional: Callable[[Any], Any] | None = None
     kind: type = float
     work_of: tuple[str, ...] = ()
     note: str = ""

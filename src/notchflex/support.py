@@ -76,6 +76,7 @@ _HOME = {
             "AXES",
             "CONTACT_STATES",
             "QUANTITIES",
+            "entries_there",
             "holds",
             "spans_of",
         ),

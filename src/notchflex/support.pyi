@@ -54,6 +54,7 @@ from notchflex.results.io import write_parquet as write_parquet
 from notchflex.results.quantities import AXES as AXES
 from notchflex.results.quantities import CONTACT_STATES as CONTACT_STATES
 from notchflex.results.quantities import QUANTITIES as QUANTITIES
+from notchflex.results.quantities import entries_there as entries_there
 from notchflex.results.quantities import holds as holds
 from notchflex.results.quantities import spans_of as spans_of
 from notchflex.results.reading import Table as Table

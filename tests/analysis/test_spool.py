@@ -8,6 +8,7 @@ import pytest
 import notchflex as nf
 from notchflex.robot import robot_text
 from notchflex.robot.reading import robot_from_text
+from refusals import refused
 from robots import ready
 
 SHEATH = {"sheath_length": 800.0, "sheath_wire_stiffness": 9000.0}
@@ -55,6 +56,9 @@ def test_what_is_refused():
         nf.spool_path(ready("a"), [0.0])
     with pytest.raises(nf.InputError, match="steps by 1 spools"):
         nf.spool_path(robot, np.zeros((3, 2)))
+    with refused("NOT_CONVERGED", "no state", "pretension", "smaller drive.pretension"):
+        uneven = {"tendon[2].radius": 0.6, "tendon.path": "straight", "drive.pretension": 100.0}
+        nf.spool_path(robot.with_values(uneven), [0.0])
     with pytest.raises(nf.InputError, match="the robot has 2 tendons"):
         robot.with_value("drive.antagonist", 3)
     with pytest.raises(nf.InputError, match="a spool drives already"):

@@ -1,5 +1,6 @@
 """Loads on the command line: what `--tension`, `--tip-force` and the others stand for."""
 
+import csv
 import json
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 import notchflex as nf
 from notchflex.cli import run
 from notchflex.support import parse_whole, read_command
+from refusals import refused
 
 NUMBERS = st.floats(-100.0, 100.0, allow_nan=False)
 WRIST = ("simulate", "pacheco2021-a")
@@ -118,3 +120,39 @@ def test_a_temperature_for_all_steps_or_for_each(capsys):
     assert "2 temperatures for 3 steps" in capsys.readouterr().err
     assert run(["simulate", "pacheco2021-a-true", *options, "37"]) == 2
     assert "reference_temperature" in capsys.readouterr().err
+
+
+def test_a_path_that_varies_temperature_or_bend_has_their_columns(tmp_path, capsys):
+    known = ["--set", "material.reference_temperature=22", "--csv", str(tmp_path / "path.csv")]
+    loads = ["--tension", "1", "--temperature", "22:37:2"]
+    assert run(["simulate", "pacheco2021-a-true", *loads, *known]) == 0
+    out = capsys.readouterr().out
+    assert "external loads of step 1: temperature 22 °C" in out
+    assert [line.split()[1] for line in out.splitlines() if line.split()[:1] in (["1"], ["2"])] == [
+        "22",
+        "37",
+    ]
+    with open(tmp_path / "path.csv", encoding="utf-8") as file:
+        rows = [*csv.DictReader(file)]
+    assert [float(row["temperature_C"]) for row in rows] == [22.0, 37.0]
+    wrist = nf.load_robot("pacheco2021-a").with_values(
+        {"tendon.sheath_length": 500.0, "tendon.sheath_wire_stiffness": 1e4}
+    )
+    path = nf.simulate(wrist, [nf.Load(1.0), nf.Load(1.0, sheath_bend_deg=90.0)])
+    assert path.sheath_bend == pytest.approx([np.nan, np.pi / 2.0], nan_ok=True, rel=1e-15)
+    table = path.to_dataframe()
+    assert table["sheath_bend_deg"].to_list() == [None, pytest.approx(90.0, rel=1e-14)]
+    assert "temperature_C" not in table.columns
+    assert "sheath_bend_deg" not in nf.simulate(wrist, nf.Load(1.0)).to_dataframe().columns
+
+
+def test_a_bend_without_a_sheath_is_refused(capsys):
+    options = ["--tension", "1", "--sheath-bend-deg", "90"]
+    assert run(["simulate", "pacheco2021-a", *options]) == 2
+    message = capsys.readouterr().err
+    assert "no effect" in message
+    assert "tendon.sheath_length" in message
+    with refused("OUT_OF_RANGE", "at most 3600 deg"):
+        nf.Load(1.0, sheath_bend_deg=1e9)
+    with refused("UNSUPPORTED", "sheath"):
+        nf.solve(nf.load_robot("pacheco2021-a"), nf.Load(1.0, sheath_bend_deg=10.0))

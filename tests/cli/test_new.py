@@ -363,7 +363,7 @@ def test_a_decimal_comma_in_a_list_gets_a_hint(capsys):
     assert "For decimal commas, separate numbers by semicolons, or write a point: 1.9." in err
 
 
-def test_what_a_data_sheet_prints_makes_the_constants(monkeypatch, tmp_path):
+def test_what_a_data_sheet_prints_makes_the_constants(monkeypatch, tmp_path, capsys):
     pipe(monkeypatch)
     sheet = {"upper_plateau": "520", "lower_plateau": "230", "test_temperature": "22"}
     assert run(command("w", "--yes", **sheet, elastic_modulus="48000", plateau_modulus="800")) == 0
@@ -378,6 +378,11 @@ def test_what_a_data_sheet_prints_makes_the_constants(monkeypatch, tmp_path):
         run(command("v", "--yes", upper_plateau="520", material="linear", elastic_modulus="9")) == 2
     )
     assert run(command("v", "--yes", upper_plateau="100")) == 2
+    assert "no material has an upper_plateau of 100" in capsys.readouterr().err
+    assert run(command("v", "--yes", upper_plateau="520", lower_plateau="600")) == 2
+    assert "`lower_plateau` is 600 MPa; it must be less" in capsys.readouterr().err
+    assert run(command("v", "--yes", lower_plateau="200")) == 2
+    assert "an option that it goes with is missing" in capsys.readouterr().err
     asked = person(monkeypatch, *[""] * 5, "500", "", "none", *[""] * 5)
     assert run(command("p", friction="0.1", title="x")) == 0
     assert any("Upper plateau" in words for words in asked)

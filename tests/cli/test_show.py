@@ -1,6 +1,7 @@
 """`notchflex show`: sections and closing of every notch."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -96,3 +97,29 @@ def test_plateaus_and_closing_at_both_temperatures(capsys):
     stress = wrist.material.plateau_stress - 97.5
     tension = nf.closing(wrist.with_value("material.plateau_stress", stress)).tension
     assert bench["closing_tension_N"] == pytest.approx([tension.min(), tension.max()], rel=1e-12)
+
+
+def test_flexures_of_a_nitinol_of_their_own_are_warmed_and_named(call, tmp_path):
+    """The material of the robot, that of no flexure here, has no part in the table."""
+    wrist = nf.load_robot("pacheco2021-a-true").with_value("material.reference_temperature", 22.0)
+    arc = replace(wrist.notch[0], repeat=1)
+    strong = replace(wrist.material, plateau_stress=400.0)
+    linear = nf.Linear(50e3, density=wrist.material.density)
+    notch = [replace(arc, material=strong), replace(arc, material=linear), arc]
+    tendon = [replace(wrist.tendon[0], end_body=None)]
+    nf.save_robot(wrist.replace(notch=notch, tendon=tendon), tmp_path / "mixed.toml")
+    rows = json.loads(call("show", "mixed.toml", "--json", "-")[1])["temperatures"]
+    assert [(row["temperature_C"], row["notches"]) for row in rows] == [
+        (22.0, "1"),
+        (22.0, "3"),
+        (37.0, "1"),
+        (37.0, "3"),
+    ]
+    usual = wrist.material.plateau_stress
+    plateaus = [400.0, usual, 497.5, usual + 97.5]
+    assert [row["plateau_MPa"] for row in rows] == pytest.approx(plateaus, abs=1e-9)
+    shifted = [replace(wrist.material, plateau_stress=one) for one in plateaus[2:]]
+    warm = [replace(arc, material=shifted[0]), notch[1], replace(arc, material=shifted[1])]
+    tension = nf.closing(wrist.replace(notch=warm, tendon=tendon)).tension
+    found = [row["closing_tension_N"] for row in rows[2:]]
+    assert found == [pytest.approx([one, one], rel=1e-9) for one in (tension[0], tension[2])]

@@ -125,6 +125,22 @@ def test_pretension_is_kept_and_a_held_tendon_too():
     np.testing.assert_array_equal(held.tension[2:], 0.2)
 
 
+def test_strains_that_are_not_known_have_no_limit_and_backbones_no_gap():
+    joint = nf.TableNotch(2.0, angle_deg=(5.0, 20.0), moment=(1.0, 3.0), uncut_length=1.0)
+    wrist = nf.load_robot("pacheco2021-a")
+    robot = wrist.replace(notch=(joint, *wrist.notch), tendon=(nf.Tendon(0.7),))
+    targets = {"total_angle": np.array([0.1])}
+    with refused("UNSUPPORTED", "the strain of notch 1 is not known"):
+        nf.follow(robot, targets, limits=nf.Limits(strain=0.05))
+    found = nf.follow(robot, targets, limits=nf.Limits(gap=0.1))
+    assert found.reached.all()
+    assert np.isnan(found.path.gap[0]).tolist() == [True] + [False] * 5
+    limit = nf.AcceptanceLimit("gap", lower=0.1)
+    spec = nf.ToleranceSpec([limit], {"pulled": nf.Load(0.1)}, {"notch.depth": 0.001})
+    analysis = nf.tolerance_analysis(robot, spec, draws=50)
+    assert [one.name for one in analysis.criteria] == [f"gap[{n}]" for n in range(2, 7)]
+
+
 def test_the_rate_limits_the_change_from_target_to_target():
     targets = {"total_angle": [0.2, 1.0, 1.0, 1.0]}
     found = nf.follow(WRIST, targets, limits=nf.Limits(rate=0.5))

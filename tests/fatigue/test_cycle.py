@@ -231,6 +231,60 @@ def test_a_cycle_needs_two_states_of_one_robot():
     state = nf.solve(WRIST, nf.Load(0.5))
     with pytest.raises(nf.InputError, match="two solved states"):
         nf.strain_cycle([state])
+    with pytest.raises(nf.InputError, match="one state is no cycle"):
+        nf.strain_cycle(state.path)
     other = nf.solve(WRIST.with_value("notch.depth", 1.39), nf.Load(0.5))
     with pytest.raises(nf.InputError, match="different robots"):
         nf.strain_cycle([state, other])
+
+
+MEASURED = WRIST.with_value("material.reference_temperature", 22.0)
+
+
+@pytest.mark.parametrize(
+    ("robot", "temperatures", "words"),
+    [
+        (MEASURED, (None,), "at 22 deg C, and the limit line is for 37"),
+        (MEASURED, (37.0,), ""),
+        (MEASURED, (37.0, 30.0), "at 30 and 37 deg C"),
+        (MEASURED.with_value("material.temperature", 37.0), (None,), ""),
+        (
+            WRIST.replace(notch=[replace(WRIST.notch[0], material=MEASURED.material)]),
+            (None,),
+            "at 22 deg C",
+        ),
+        (WRIST, (None,), ""),
+    ],
+)
+def test_the_temperature_of_sections_and_loads_is_compared_with_that_of_the_line(
+    robot, temperatures, words
+):
+    loads = [nf.Load(0.1, temperature=one) for one in (*temperatures, temperatures[0])]
+    sentences = [s for s in nf.strain_cycle(nf.simulate(robot, loads)).warnings() if "deg C" in s]
+    assert [words in sentence for sentence in sentences] == [True] * bool(words)
+
+
+def test_round_backbones_have_no_corners_and_tables_no_strain():
+    rods = nf.RodGap(3.0, 0.8, uncut_length=0.5, repeat=2)
+    table = nf.TableNotch(2.0, angle_deg=(5.0, 20.0), moment=(1.0, 3.0), uncut_length=1.0)
+    tendon = [replace(WRIST.tendon[0], end_body=None, path="straight")]
+    notch = [rods, table, replace(WRIST.notch[0], repeat=1)]
+    robot = WRIST.replace(notch=notch, tendon=tendon)
+    path = nf.simulate(robot, nf.pull(0.0, 0.1, steps=2).release())
+    plain = nf.strain_cycle(path, limit=nf.Fatigue(line="cao2020"))
+    for corner in ({"corner_factor": 3.0}, {"corner_radius": 0.05}):
+        cycle = nf.strain_cycle(path, limit=nf.Fatigue(line="cao2020", **corner))
+        assert cycle.corner_factor[:2].tolist() == [1.0, 1.0]
+        assert cycle.margin[:2] == pytest.approx(plain.margin[:2], abs=0.0)
+        assert cycle.smallest_margin[3] < plain.smallest_margin[3]
+        known = robot.replace(fatigue=cycle.limit)
+        margin = nf.solve(known, nf.Load(0.1)).fatigue_margin
+        assert np.isfinite(margin).tolist() == [True, True, False, True]
+    assert cycle.to_table()["at"][:2] == ["surface", "surface"]
+    sentences = plain.warnings()
+    assert next(s for s in sentences if "known strain" in s).endswith("have no margin: 3.")
+    assert not any("mean strains of" in sentence for sentence in sentences)
+    alone = nf.simulate(
+        WRIST.replace(notch=[rods], tendon=tendon), nf.pull(0.0, 0.1, steps=2).release()
+    )
+    assert nf.strain_cycle(alone, limit=nf.Fatigue(line="cao2020")).warnings() == []

@@ -1,5 +1,6 @@
 """The dimensioned drawing: the robot's own lengths, true to scale, with texts that can be read."""
 
+import dataclasses
 import itertools
 import math
 
@@ -11,6 +12,7 @@ import notchflex as nf
 from notchflex.plotting import dimensioned_figure, notch_rows
 from notchflex.plotting.drawing import MAX_SHAPES
 from notchflex.plotting.shapes import outline, shape_from_angles
+from refusals import refused
 
 ROBOTS = ["pacheco2021-a", "pacheco2021-c", "york2015", "liu2022", "gao2017", "two-axis-wrist"]
 UNUSUAL = {
@@ -154,6 +156,22 @@ def test_equal_notches_share_a_drawing_and_the_rest_is_named():
     texts = texts_of(nf.load_robot("two-axis-wrist").with_values(depths))
     assert sum(text.startswith("notch ") for text in texts) == MAX_SHAPES
     assert any("Not shown: notches 7, 8." in text for text in texts)
+
+
+def test_sections_have_their_own_diameters_and_what_has_no_cuts_is_named():
+    joint = nf.TableNotch(2.0, angle_deg=(5.0, 20.0), moment=(1.0, 3.0), uncut_length=1.0)
+    wrist = nf.load_robot("pacheco2021-a")
+    own = dataclasses.replace(wrist.notch[0], tube=nf.Tube(1.7, 1.45), repeat=2)
+    robot = wrist.replace(notch=(joint, own), tendon=(nf.Tendon(0.7),))
+    texts = texts_of(robot)
+    assert {"outer diameter 1.7", "inner diameter 1.45"} <= set(texts)
+    assert [text.partition(":")[0] for text in texts if text.startswith("notch")] == ["notches 2–3"]
+    assert any("Not shown, as cuts are not known: notch 1." in text for text in texts)
+    with refused("UNSUPPORTED", "the cuts of no notch"):
+        dimensioned_figure(robot.replace(notch=(joint,)))
+    for name in ("a.stl", "a.dxf"):
+        with refused("UNSUPPORTED", 'notch 1 is of kind = "table"'):
+            nf.export_robot(robot.replace(notch=(joint, wrist.notch[0])), name)
 
 
 def test_a_kind_without_names_of_its_pieces_is_drawn_with_their_lengths(monkeypatch):

@@ -27,6 +27,7 @@ def test_only_angles_change_their_number_at_the_edge():
         "chord_angle",
         "total_chord_angle",
         "contact_turning",
+        "sheath_bend",
     }
     assert {q.unit for q in QUANTITIES.values() if q.scale != 1.0} == {"deg"}
 

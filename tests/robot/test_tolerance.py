@@ -36,6 +36,17 @@ def test_what_was_read_is_written_unchanged_and_fresh_files_are_the_same_robot()
     assert hash(robot) != hash(robot.replace(tolerance=None))
 
 
+def test_parts_of_notches_need_no_quotes():
+    own = SOURCE.replace(
+        "[[tendon]]", "[notch.tube]\nouter_diameter = 1.7\ninner_diameter = 1.4\n[[tendon]]"
+    )
+    robot = robot_from_text(
+        own + "\n[tolerance]\nnotch.depth = 0.01\nnotch.tube.outer_diameter = 0.02\n"
+    )
+    assert [one.value for one in robot.tolerance] == ["notch.depth", "notch.tube.outer_diameter"]
+    assert robot_from_text(robot_text(robot, "")) == robot
+
+
 def test_tolerances_are_set_added_and_taken_away():
     robot = robot_from_text(SOURCE + TABLE)
     other = robot.with_value("tolerance.notch.depth", 0.03)

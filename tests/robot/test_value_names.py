@@ -107,6 +107,7 @@ def test_a_change_of_kind_keeps_what_is_shared_and_tells_the_rest(robot: nf.Robo
         ("material.elastic", 1.0, ["`material.elastic`", "Allowed: kind, elastic_modulus"]),
         ("material.kind", "liner", ["did you mean `linear`?"]),
         ("tube.kind", "x", ["`tube.kind`", "Allowed: outer_diameter"]),
+        ("notch[3].tube.outer_diameter", 1.8, ["no notch", "[notch.tube]", "tube.outer_diameter"]),
         ("notch[a].depth", 1.0, ["not the name of a value"]),
         ("", 1.0, ["not the name of a value"]),
         ("notch[2].depth", 1.7, ["`notch[2].depth`", "1.7 mm", "outer diameter"]),

@@ -343,6 +343,7 @@ def test_a_robot_without_a_sheath_has_no_quantities_of_it():
     ({"sheath_wire_stiffness": None}, "is missing; give E A of the wire"),
     ({"sheath_length": None}, "needs a sheath; give sheath_length"),
     ({"sheath_friction": -0.1}, "at least 0"),
+    ({"sheath_friction": 1000.0}, "at most 10"),
     ({"sheath_length": 0.0}, "greater than 0"),
 ])  # fmt: skip
 def test_what_is_refused(values, words):

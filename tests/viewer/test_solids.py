@@ -107,6 +107,35 @@ def slot(tube, reach, radius):
     return total
 
 
+def test_sections_have_their_own_tubes_and_measured_joints_are_sleeves():
+    wide, arc = nf.Tube(1.9, 1.6), ready("A").notches[0]
+    numbers = {"stiffness": (50.0, 50.0, 40.0, 6.0, 6.0, 900.0), "tube": wide}
+    joints = (nf.TableNotch(3.0, uncut_length=length, **numbers) for length in (0.5, 0.0))
+    strip = nf.StripNotch(height=0.6, strip_thickness=0.2, depth=1.6, tube=wide)
+    robot = ready("A").replace(
+        notch=(*joints, strip, arc), tendon=(nf.Tendon(0.6, path="straight"),)
+    )
+    bodies, flexures = pieces(robot)
+    assert bodies[2].is_watertight  # the first cut of the strip
+
+    def wall(tube):
+        return np.pi * (tube.outer_radius**2 - tube.inner_radius**2)
+
+    for one in flexures[:2]:
+        assert one.is_watertight
+        assert one.volume == pytest.approx(3.0 * wall(wide), rel=1e-8)
+    assert bodies[1].volume == pytest.approx(0.5 * wall(wide), rel=1e-8)
+    assert bodies[-1].volume == pytest.approx(arc.uncut_length * wall(robot.tube), rel=1e-8)
+    alone = pieces(
+        ready("A").replace(notch=(strip,), tube=wide, tendon=(nf.Tendon(0.6, path="straight"),))
+    )[1]
+    assert flexures[2].volume == pytest.approx(alone[0].volume, rel=1e-6)
+    shape, moved = solids(robot).at(nf.simulate(robot, nf.Load(0.1)))
+    bent = closed(moved[0], solids(robot).flexures[0][1])
+    assert bent.volume == pytest.approx(3.0 * wall(wide), rel=1e-3)
+    assert len(shape.position) == 5
+
+
 def test_links_and_pieces_fill_the_tube_but_for_its_slots():
     robot = nf.load_robot("gao2017")
     tube, link = robot.tube, robot.notches[0]

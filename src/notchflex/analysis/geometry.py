@@ -108,6 +108,8 @@ class Geometry:
     def cuts(self) -> tuple[CutLayout, ...]:
         """What every notch removes from the straight tube, measured from the base along it.
 
+        Of what is not cut, but known by numbers or a backbone, it is the whole gap.
+
         Raises:
             InputError: A kind of notch does not know its cuts.
         """

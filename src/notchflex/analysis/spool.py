@@ -51,6 +51,11 @@ def spool_path(robot: Robot, ways: ArrayLike) -> LoadPath:
     tension, stroke = np.full((2, len(table) + 1, robot.number_of_tendons), np.nan)
     both = np.array([(drive.tendon, drive.antagonist) for drive in drives]) - 1
     tension[0, both] = [[drive.pretension] for drive in drives]
-    start = solve(robot, LoadPath(tension[:1])[0]).raise_if_failed().stroke
-    stroke[1:, both] = start[both] + table[..., None] * [1.0, -1.0]
+    state = solve(robot, LoadPath(tension[:1])[0])
+    if not state.converged:
+        raise InputError.NOT_CONVERGED(
+            f"no state of {robot.name} has the pretension of its spools: {state.reason}; give a "
+            "smaller drive.pretension"
+        )
+    stroke[1:, both] = state.stroke[both] + table[..., None] * [1.0, -1.0]
     return LoadPath(tension, stroke)

@@ -24,6 +24,8 @@ PERCENT = ("outer_strain", "peak_strain", "fatigue_margin")
 """Strains, which files hold as numbers, are shown in percent."""
 
 USUAL = (
+    "temperature",
+    "sheath_bend",
     "tension",
     "stroke",
     "total_chord_angle",
@@ -57,7 +59,8 @@ MEANINGS = {
 """Texts of the legend; other quantities have their titles there."""
 
 _EVERY_STEP = (
-    "commanded_tension", "commanded_stroke", "converged", "reason", "residual", "iterations",
+    "commanded_tension", "commanded_stroke", "temperature", "sheath_bend",
+    "converged", "reason", "residual", "iterations",
 )  # fmt: skip
 """Quantities that steps without convergence have too."""
 
@@ -101,8 +104,10 @@ def print_path(
     """
     rows, stride = shown_rows(path, every_row=every_row)
     terminal.line(title, "bold")
-    if words := ", ".join(external_words(path.load.external[0])):
-        _print_lines(f"external loads: {words}", terminal.NARROW, "    ")
+    first, *others = path.load.external
+    if words := ", ".join(external_words(first)):
+        step = "" if all(load == first for load in others) else " of step 1"
+        _print_lines(f"external loads{step}: {words}", terminal.NARROW, "    ")
     if bands is not None:
         shown = banded_columns(bands, rows, columns or ("total_angle", "tip_position"))
     elif columns:
@@ -193,7 +198,7 @@ def banded_columns(
     bands: Bands, rows: Sequence[int], names: Sequence[str]
 ) -> dict[str, list[PathColumn]]:
     """Return what is commanded, and low end, middle and high end of quantities."""
-    commands = ("commanded_tension", "commanded_stroke")
+    commands = ("commanded_tension", "commanded_stroke", "temperature", "sheath_bend")
     shown = {name: path_columns(bands.path, rows, name) for name in (*commands, *names)}
     for name in (name for name in names if name in bands):
         ends = [path_columns(bands.end(end), rows, name) for end in ("low", "median", "high")]

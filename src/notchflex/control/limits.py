@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import Field, model_validator
 
-from notchflex import InputError
+from notchflex import InputError, Robot
 from notchflex.specification import coded, record
 from notchflex.support import Float as Number
 from notchflex.support import check_number, short_repr
@@ -90,11 +90,21 @@ class Limits:
 
 
 def limits_of_robot(
-    limits: Limits, drive: Drive, tendons: int, notches: int
+    limits: Limits, drive: Drive, robot: Robot
 ) -> list[tuple[str, float, Float[np.ndarray, " m"]]]:
-    """Return limits beside those of the drives: quantity, 1 if the highest or -1, and values."""
+    """Return limits beside those of the drives: quantity, 1 if the highest or -1, and values.
+
+    Raises:
+        InputError: A strain is limited that is not known.
+    """
     other: Drive = "stroke" if drive == "tension" else "tension"
-    low, high = limits.bounds(other, tendons)
+    low, high = limits.bounds(other, robot.number_of_tendons)
+    unknown = [number for number, notch in enumerate(robot.notches, 1) if not notch.is_cut]
+    if limits.strain is not None and unknown:
+        raise InputError.UNSUPPORTED(
+            f"the strain of notch {unknown[0]} is not known, so that no limit on it can be kept; "
+            "leave the limit of strain out"
+        )
     strain = np.inf if limits.strain is None else limits.strain
     gap = -np.inf if limits.gap is None else limits.gap
     if other == "tension":
@@ -102,7 +112,7 @@ def limits_of_robot(
     rows = [
         (other, 1.0, high),
         (other, -1.0, low),
-        ("peak_strain", 1.0, np.full(notches, strain)),
-        ("gap", -1.0, np.full(notches, gap)),
+        ("peak_strain", 1.0, np.full(robot.number_of_notches, strain)),
+        ("gap", -1.0, np.array([gap if notch.has_lips else -np.inf for notch in robot.notches])),
     ]
     return [row for row in rows if np.isfinite(row[2]).any()]

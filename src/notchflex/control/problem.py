@@ -242,7 +242,7 @@ def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> Pro
             "the load commands every tendon, so that none is left to be driven; "
             "leave the tension of those to be driven out"
         )
-    limited = limits_of_robot(limits, drive, tendons, robot.number_of_notches)
+    limited = limits_of_robot(limits, drive, robot)
     outputs = {*targets.outputs, *(quantity for quantity, _, _ in limited)}
     words = np.where(held, np.where(np.isnan(stroke), "tension", "stroke"), drive).tolist()
     stepper = _stepper(robot, outputs, words, options)

@@ -511,8 +511,11 @@ class DesignProblem:
         rows = joined(self._row_numbers(point))
         bounded = tuple(joined([wish.read(point)]) for wish, _ in self.bounds)
         if not all(np.isfinite(table).all() for table in (objective, rows, *bounded)):
+            of_rows = zip(self.rows, rows[:, 0], strict=True)
+            names = [row.title for row, number in of_rows if not np.isfinite(number)]
             raise InputError.NOT_FINITE(
-                "a quantity that is asked is not a number, as where a notch never closes"
+                f"{(names or ['an objective'])[0]} is not a number, as where a notch never closes "
+                "or a limit line does not reach"
             )
         return DesignEvaluation(z, point, objective, rows, bounded, total)
 

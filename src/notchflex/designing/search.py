@@ -121,7 +121,7 @@ def search(
         most = reasons.most_common(1)[0][0] if reasons else "no robot was tried"
         raise InputError.UNSUPPORTED(
             "no robot between the limits of the variables can be made and solved; most often: "
-            f"{most.splitlines()[0]} Change the limits or the loads."
+            f"{most.splitlines()[0].rstrip('.')}. Change the limits or the loads."
         )
     return searches
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
+from itertools import accumulate, pairwise
 from string import ascii_lowercase
 from typing import NamedTuple
 
@@ -27,11 +28,13 @@ class PlacedCut(NamedTuple):
         notch: Number of the notch that it belongs to, from 1 at the base.
         name: That number, with a letter where the notch has several cuts.
         cut: The cut; its corners are measured from the base along the tube [mm].
+        outer: Outer radius of the tube that it is cut into [mm].
     """
 
     notch: int
     name: str
     cut: NotchCut
+    outer: float
 
     @property
     def start(self) -> float:
@@ -45,7 +48,7 @@ class PlacedCut(NamedTuple):
 
 
 class Ring(NamedTuple):
-    """A ring about the tube axis: a backbone, or what joins it to a disk [mm]."""
+    """A ring about the tube axis: a length of tube, a backbone, what joins it to a disk [mm]."""
 
     low: float
     high: float
@@ -57,12 +60,14 @@ class RobotCuts(NamedTuple):
     """A tube and what is cut out of it.
 
     Attributes:
-        tube: The tube that is cut.
+        tube: The tube that is cut, of several the first.
         cuts: Every cut, base to tip as the notches stand.
         start: Where the tube is cut off on the base side, from the base [mm]; negative.
         end: Where it ends [mm].
         warnings: A sentence where that is not the tip of the robot file.
-        rings: What is added to the tube without its cuts: backbones, which the disks hold.
+        walls: The lengths of tube that are cut, base to tip.
+        rings: What is added to them without their cuts: backbones, which the disks hold, and
+            sleeves for notches that are known by numbers.
     """
 
     tube: Tube
@@ -70,11 +75,12 @@ class RobotCuts(NamedTuple):
     start: float
     end: float
     warnings: tuple[str, ...]
-    rings: tuple[Ring, ...] = ()
+    walls: tuple[Ring, ...]
+    rings: tuple[Ring, ...]
 
 
 def cuts_of(robot: Robot, shank: float = 0.0, polishing: float = 0.0) -> RobotCuts:
-    """Return every cut of a robot in its straight tube.
+    """Return every cut of a robot in its straight tube, or tubes.
 
     Args:
         robot: The robot, as it is after polishing.
@@ -90,18 +96,18 @@ def cuts_of(robot: Robot, shank: float = 0.0, polishing: float = 0.0) -> RobotCu
         >>> len(cuts.cuts), round(cuts.cuts[-1].start, 9), round(cuts.end, 9)
         (5, 8.0, 10.0)
     """
-    check_one_tube(robot)
     tube, layouts, warnings = robot.tube, robot.geometry.cuts, ()
     with naming("the tube before polishing"):
         stock = Tube(tube.outer_diameter + 2.0 * polishing, tube.inner_diameter - 2.0 * polishing)
     cuts = [
-        PlacedCut(number, f"{number}{letter if len(layout.cuts) > 1 else ''}", cut)
-        for number, layout in enumerate(layouts, start=1)
+        PlacedCut(number, f"{number}{letter if len(layout.cuts) > 1 else ''}", cut, of.outer_radius)
+        for number, (layout, of) in enumerate(zip(layouts, robot.tubes[1:], strict=True), start=1)
         for letter, cut in zip(ascii_lowercase, layout.cuts, strict=False)
     ]
-    end = sum((layout.length for layout in layouts), tube.base_length)
+    *starts, end = accumulate((layout.length for layout in layouts), initial=tube.base_length)
     last, wall = max(cut.end for cut in cuts), tube.outer_radius - tube.inner_radius
-    on_backbone = robot.notches[-1].is_round  # the last disk may have no thickness
+    last_notch = robot.notches[-1]
+    on_backbone = last_notch.is_round or not last_notch.is_cut  # its body may have no length
     if end <= last and not on_backbone:
         warnings = (
             f"the last cut ends at {last:.6g} mm and the robot file at {end:.6g} mm, which leaves "
@@ -116,15 +122,26 @@ def cuts_of(robot: Robot, shank: float = 0.0, polishing: float = 0.0) -> RobotCu
         )
     if polishing:
         cuts = [_unpolished(cut, tube, stock, polishing) for cut in cuts]
-    return RobotCuts(stock, tuple(cuts), -shank - polishing, end + polishing, warnings, rings)
+    low, high = -shank - polishing, end + polishing
+    tubes = robot.tubes if len(set(robot.tubes)) > 1 else (stock,)
+    walls = [
+        Ring(start, stop, one.outer_radius, one.inner_radius)
+        for one, (start, stop) in zip(
+            tubes, pairwise([low, *starts[: len(tubes) - 1], high]), strict=True
+        )
+        if start < stop
+    ]
+    return RobotCuts(stock, tuple(cuts), low, high, warnings, tuple(walls), rings)
 
 
 def _rings(robot: Robot, cuts: list[PlacedCut], low: float, high: float) -> Iterator[Ring]:
     """Yield every backbone through its gap and the bodies beside it, and what fills their holes."""
-    reach = 0.5 * (robot.tube.outer_radius + robot.tube.inner_radius)
-    for notch, placed in zip(robot.notches, cuts, strict=False):
+    for placed in cuts:
+        notch, tube = robot.notches[placed.notch - 1], robot.tubes[placed.notch]
+        start, end, reach = placed.start, placed.end, 0.5 * (tube.outer_radius + tube.inner_radius)
+        if not notch.is_cut:
+            yield Ring(start, end, tube.outer_radius, tube.inner_radius)
         if isinstance(notch, RodGap):
-            start, end = placed.start, placed.end
             begin = max((cut.end for cut in cuts if cut.end <= start), default=low)
             stop = min((cut.start for cut in cuts if cut.start >= end), default=high)
             outer, inner = 0.5 * notch.diameter, 0.5 * notch.inner_diameter
@@ -135,7 +152,14 @@ def _rings(robot: Robot, cuts: list[PlacedCut], low: float, high: float) -> Iter
 
 
 def check_one_tube(robot: Robot) -> None:
-    """Refuse a robot that is made of several tubes or materials."""
+    """Refuse a robot that is made of several tubes or materials, or whose cuts are not known."""
+    for number, notch in enumerate(robot.notches, start=1):
+        if not notch.is_cut:
+            raise InputError.UNSUPPORTED(
+                f'notch {number} is of kind = "{notch.kind}", whose cuts are not known, so nothing '
+                "can be made of it; describe it by a kind that is cut, such as "
+                '"arc", or view the robot.'
+            )
     if len({*robot.tubes, *robot.materials}) > 2:
         raise InputError.UNSUPPORTED(
             f"{robot.name} is made of several tubes or materials, and this file is of one piece; "
@@ -172,7 +196,7 @@ def _unpolished(placed: PlacedCut, tube: Tube, stock: Tube, polishing: float) ->
         else:
             corners = shrunk(cut.corners, inside, top)
     radii = tuple(max(radius - polishing, 0.0) for radius in cut.radii)
-    return placed._replace(cut=cut._replace(corners=tuple(corners), radii=radii))
+    return placed._replace(cut=cut._replace(corners=tuple(corners), radii=radii), outer=top)
 
 
 class Hole(NamedTuple):

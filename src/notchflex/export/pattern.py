@@ -20,7 +20,7 @@ from shapely.affinity import translate
 from shapely.geometry.polygon import orient
 
 from notchflex import InputError, Robot, Tube
-from notchflex.export.cuts import PlacedCut, angle_at, cuts_of, naming
+from notchflex.export.cuts import PlacedCut, angle_at, check_one_tube, cuts_of, naming
 from notchflex.export.formats import PatternOptions, Subject
 from notchflex.support import Arc, Line, NotchCut, Point, pieces, robot_digest
 
@@ -244,8 +244,10 @@ def flat_pattern(subject: Subject, options: PatternOptions) -> FlatPattern:
             cuts meet, or kerf and radii do not fit.
     """
     robot = subject.robot
-    tube, placed, start, end, warnings, rings = cuts_of(robot, options.shank, options.polishing)
-    if rings:
+    check_one_tube(robot)
+    made = cuts_of(robot, options.shank, options.polishing)
+    tube, placed, start, end, warnings = made[:5]
+    if made.rings:
         raise InputError.UNSUPPORTED(
             "a robot of disks on a backbone is not cut from a tube, so it has no flat pattern; "
             "export a solid, --stl or --step."

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from notchflex import EquilibriumPath, InputError, Robot, RobotShape, __version__
-from notchflex.export.cuts import RobotCuts, cuts_of
+from notchflex.export.cuts import RobotCuts, check_one_tube, cuts_of
 from notchflex.export.formats import Document, SolidOptions, Subject
 from notchflex.plotting import fair_growth, prism, ring_solid, shape_at, shape_from_angles
 from notchflex.support import FlexureShape, NotchCut, outline, robot_digest
@@ -155,18 +155,20 @@ def _wall(
     from manifold3d import Manifold, OpType
 
     removed = [
-        _removed(placed.cut, cuts.tube.outer_radius, sides, chord)
+        _removed(placed.cut, placed.outer, sides, chord)
         for placed in cuts.cuts
         if placed.start < high and placed.end > low
     ]
-    radii = cuts.tube.outer_radius, cuts.tube.inner_radius
-    wall = ring_solid(radii, (low, high), sides)
+    walls, rings = (
+        [
+            ring_solid((ring.outer, ring.inner), ends, sides)
+            for ring in of
+            if (ends := (max(low, ring.low), min(high, ring.high)))[0] < ends[1]
+        ]
+        for of in (cuts.walls, cuts.rings)
+    )
+    wall = Manifold.batch_boolean(walls, OpType.Add)
     left = wall - Manifold.batch_boolean([*removed, *drills], OpType.Add)
-    rings = [
-        ring_solid((ring.outer, ring.inner), ends, sides)
-        for ring in cuts.rings
-        if (ends := (max(low, ring.low), min(high, ring.high)))[0] < ends[1]
-    ]
     if not rings:
         return left
     # Rings in one another leave edges of 1e-6 mm, which single precision would open.
@@ -287,7 +289,7 @@ def _zone(rest: RobotShape, bent: RobotShape, cuts: RobotCuts, notch: int) -> Zo
     poses = _poses(line, bent.flexures[notch])
     first = next(number for number, cut in enumerate(cuts.cuts) if cut.notch == notch + 1)
     has_spine, cut = robot.geometry.has_spine[notch], cuts.cuts[first]
-    side, outer = math.radians(robot.notches[notch].direction_deg), robot.tube.outer_radius
+    side, outer = math.radians(robot.notches[notch].direction_deg), cut.outer
     across = [math.cos(side), math.sin(side), 0.0]
     direction = np.array([0.0, 0.0, 1.0] if has_spine else across)
     places = line.position @ direction
@@ -404,6 +406,7 @@ def stl_solid(subject: Subject, options: SolidOptions) -> Document:
         InputError: See `straight_solid`.
     """
     robot, bent = subject.robot, is_bent(subject, options.polishing)
+    check_one_tube(robot)
     cuts = cuts_of(robot, options.shank, options.polishing)
     solid = straight_solid(robot, cuts, options)
     check_one_piece(len(solid.decompose()))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from notchflex import InputError, Robot, __version__
-from notchflex.export.cuts import RobotCuts, cuts_of
+from notchflex.export.cuts import RobotCuts, check_one_tube, cuts_of
 from notchflex.export.formats import Document, SolidOptions, Subject, plain_name
 from notchflex.export.solids import (
     REACH,
@@ -47,6 +47,7 @@ def step_solid(subject: Subject, options: SolidOptions) -> Document:
             f"{has_spine.argmin() + 1} bends a strip across the tube. Write an STL file, or the "
             "STEP file of the straight robot."
         )
+    check_one_tube(robot)
     cuts = cuts_of(robot, options.shank, options.polishing)
     solid = _straight(robot, cuts, options)
     check_one_piece(len(solid.solids()))

@@ -40,6 +40,8 @@ class StrainCycle(Displayed):
         amplitude: Its amplitude there, half the range.
         margin: Amplitude that the line allows less this one; NaN where the line is not known.
         corner_factor: Factor on the strain at the corners of the cut of every notch, (n,).
+        temperatures: Temperatures of notches in all states, each once, deg C; those not known are
+            left out.
         loops: How often the path was followed until its strains repeated; 0 for states.
         reason: Why the strains do not hold: a step that did not converge, or loops that still
             differ; empty where they do.
@@ -51,6 +53,7 @@ class StrainCycle(Displayed):
     amplitude: Points
     margin: Points
     corner_factor: Float[np.ndarray, " n"]
+    temperatures: tuple[float, ...]
     loops: int
     reason: str
 
@@ -76,22 +79,31 @@ class StrainCycle(Displayed):
         values = self.mean[rows], self.amplitude[rows], self.smallest_margin
         names = (f"{name}_%" for name in ("mean", "amplitude", "margin"))
         numbers = {n: (100.0 * v).tolist() for n, v in zip(names, values, strict=True)}
-        places = PLACES[self.worst[:, 1]].tolist()
+        points = zip(self.robot.notches, self.worst[:, 1].tolist(), strict=True)
+        places = ["surface" if notch.is_round else str(PLACES[point]) for notch, point in points]
         return {"notch": [*range(1, len(places) + 1)], "at": places, **numbers}
 
     def warnings(self) -> list[str]:
         """Return a sentence for all that the margins do not hold, and what they leave out."""
-        facts, robot = self.limit.facts, self.robot
+        facts, notches = self.limit.facts, self.robot.notches
         warnings = [f"the strains do not hold: {self.reason}."] if self.reason else []
+        unknown = ~np.isfinite(self.mean).all(axis=(1, 2))
+        if unknown.any() and not self.reason:
+            numbers = ", ".join(map(str, np.flatnonzero(unknown) + 1))
+            warnings.append(
+                f"notches without a known strain, such as of a table, have no margin: {numbers}."
+            )
+        known = np.isfinite(self.mean) & np.isfinite(self.corner_factor)[:, None, None]
         if not facts:
             warnings.append('there is no limit line; give one, such as fatigue.line = "cao2020".')
-        elif np.isnan(self.margin).any():
+        elif (known & np.isnan(self.margin)).any():
             low, high = (100.0 * end for end in (facts["mean"][0], facts["mean"][-1]))
             warnings.append(
                 f"the limit line is known for mean strains of {low:g} to {high:g} % only; a notch "
                 "with a point beyond them has no margin."
             )
-        if self.limit.corner_factor is None and self.limit.corner_radius is None:
+        cornered = not all(notch.is_round for notch in notches)
+        if cornered and self.limit.corner_factor is None and self.limit.corner_radius is None:
             warnings.append(
                 "the concentration of strain at the corners of the cuts is left out; give "
                 "fatigue.corner_radius, or fatigue.corner_factor (K_t)."
@@ -102,9 +114,9 @@ class StrainCycle(Displayed):
                 'cuts "on-axis" 0.68 to 0.92 outer diameters deep, rings from 0.2 and radii from '
                 "0.006 to 0.1; give fatigue.corner_factor (K_t) instead."
             )
-        at, used = facts.get("temperature"), getattr(robot.material, "temperature", None)
-        if at is not None and used is not None and used != at:
-            warnings.append(f"the robot is at {used:g} deg C, and the limit line is for {at:g}.")
+        at, used = facts.get("temperature"), " and ".join(f"{one:g}" for one in self.temperatures)
+        if at is not None and {*self.temperatures} - {at}:
+            warnings.append(f"the robot is at {used} deg C, and the limit line is for {at:g}.")
         return warnings
 
     def _summary(self) -> Summary:
@@ -148,7 +160,7 @@ def strain_cycle(
         The cycle, and its margins below the line.
 
     Raises:
-        InputError: Fewer than two states, or states of several robots or refinements.
+        InputError: Fewer than two states or steps, or states of several robots or refinements.
 
     Example:
         >>> from notchflex import load_robot, pull, simulate
@@ -158,6 +170,11 @@ def strain_cycle(
         (2, True)
     """
     if isinstance(states, EquilibriumPath):
+        if len(states) < 2:
+            raise InputError.NO_DATA(
+                "one state is no cycle, as its strain has no amplitude; give a path of two or more "
+                "steps, such as 0,0.5"
+            )
         path, loops, reason = _settled(states)
         paths = [path]
     else:
@@ -183,9 +200,14 @@ def strain_cycle(
     line = limit_line(chosen, robot)
     factor = np.ones(len(mean)) if line is None else np.asarray(line.corner_factor)
     margin: Any = np.full_like(mean, np.nan) if line is None else line.margin(mean, amplitude)
+    used = (
+        getattr(material, "used_at", None) if load.temperature is None else load.temperature
+        for path in paths for load in path.load.different for material in robot.materials[1:]
+    )  # fmt: skip
+    temperatures = tuple(sorted({one for one in used if one is not None}))
     failed = [reason for path in paths for reason in path.reason if reason]
     reason = (*failed, reason)[0]
-    return StrainCycle(robot, chosen, mean, amplitude, margin, factor, loops, reason)
+    return StrainCycle(robot, chosen, mean, amplitude, margin, factor, temperatures, loops, reason)
 
 
 def _settled(path: EquilibriumPath) -> tuple[EquilibriumPath, int, str]:

@@ -274,9 +274,14 @@ def row_commands(
 
 def _bends(load: LoadPath, chain: Chain) -> Any:
     """Return the bend of the sheaths in every step, as `Command` has it."""
-    if chain.sheath is None:
-        return None
     bends = [external.sheath_bend_deg for external in load.different]
+    if chain.sheath is None:
+        if any(bend is not None for bend in bends):
+            raise InputError.UNSUPPORTED(
+                "sheath_bend_deg has no effect: no tendon of the robot runs through a sheath; give "
+                "tendon.sheath_length (mm) and tendon.sheath_friction, or leave the bend out"
+            )
+        return None
     return np.array([-1.0 if bend is None else radians(bend) for bend in bends])[load.which]
 
 

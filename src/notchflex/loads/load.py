@@ -263,10 +263,12 @@ class ExternalLoad:
         return 1e-3 * mass * x, 1e-3 * mass * y, 1e-3 * mass * z
 
 
-def _not_negative(value: Any, what: str, unit: str) -> float:
+def _not_negative(value: Any, what: str, unit: str, most: float = float("inf")) -> float:
     number = check_number(value, what, f"a number in {unit}")
     if not 0.0 <= number < float("inf"):
         raise InputError.NOT_FINITE(f"{what} must be finite and 0 {unit} or more; got {number:g}")
+    if number > most:  # as in robot files
+        raise InputError.OUT_OF_RANGE(f"{what} must be at most {most:g} {unit}; got {number:g}")
     return number
 
 
@@ -294,7 +296,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "body_forces": _body_forces,
     "temperature": lambda value: _finite(value, "temperature", "a number of deg C"),
     "tip_mass": partial(_not_negative, what="tip_mass", unit="g"),
-    "sheath_bend_deg": partial(_not_negative, what="sheath_bend_deg", unit="deg"),
+    "sheath_bend_deg": partial(_not_negative, what="sheath_bend_deg", unit="deg", most=3600.0),
 }
 EXTERNAL = tuple(field.name for field in fields(ExternalLoad))
 _DEFAULTS = tuple((field.name, field.default) for field in fields(ExternalLoad))

@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from notchflex import ArcNotch, Robot, RodGap, StripNotch, ULink
+from notchflex import ArcNotch, InputError, Robot, RodGap, StripNotch, ULink
 from notchflex.plotting.marks import Area, Array, Arrow, Colour, Curve, Mark, Note, box
 from notchflex.plotting.style import BLUE, VERMILLION, house_style
 from notchflex.plotting.with_matplotlib import draw_marks
@@ -75,6 +75,7 @@ class NotchRow:
     def __init__(self, robot: Robot, entry: int, names: str, most: float) -> None:
         """Draw two notches of an entry of the robot file, and the last one if its cuts differ."""
         self.robot, self.notch, self.names = robot, robot.notch[entry], names
+        self.tube = tube = self.notch.tube or robot.tube
         self.length, self.breaks = 0.0, list[float]()
         self.along, self.cuts, self.faces = list[Dimension](), list[Array](), list[Array]()
         first = sum(notch.repeat for notch in robot.notch[:entry])
@@ -91,7 +92,7 @@ class NotchRow:
         for number in sorted(shown):
             if number > before + 1:
                 self._add_stub()
-                self.length += _STUB * robot.tube.outer_diameter
+                self.length += _STUB * tube.outer_diameter
             toward += self._add_notch(number)
             before = number
         end = max([self.length, *(float(cut[-1, 0]) for cut in self.cuts)])
@@ -101,7 +102,7 @@ class NotchRow:
         if not self.tip:
             self._add_stub()
         self._add_depths(toward)
-        tube, columns = robot.tube, _COLUMN * len(self.across) + 0.55
+        columns = _COLUMN * len(self.across) + 0.55
         room = most - _LEFT - columns - _RIGHT
         size = min(_DIAMETER * most, room / (1.0 + self.length / tube.outer_diameter))
         self.scale = usual_scale(size / tube.outer_diameter)
@@ -118,7 +119,7 @@ class NotchRow:
 
     def _add_piece(self, name: str, length: float, part: str = "notch") -> None:
         """Add a piece, broken if it is too long; the first one of a name has its dimension."""
-        start, most = self.length, _LONGEST * self.robot.tube.outer_diameter
+        start, most = self.length, _LONGEST * self.tube.outer_diameter
         self.length += min(length, most)
         if length > most:
             self.breaks.append(0.5 * (start + self.length))
@@ -129,13 +130,13 @@ class NotchRow:
     def _add_stub(self) -> None:
         """Add a part of a neighbouring body, broken off at its outer end."""
         start = self.length
-        self.length += _STUB * self.robot.tube.outer_diameter
+        self.length += _STUB * self.tube.outer_diameter
         self.breaks.append(self.length if start else 0.0)
 
     def _add_notch(self, number: int) -> Iterator[tuple[NotchCut, Array]]:
         """Add a notch (from 0); yield its cuts from the side of the bend, with their profiles."""
-        tube, layouts = self.robot.tube, self.robot.geometry.cuts
-        start = tube.base_length + sum(layout.length for layout in layouts[:number])
+        tube, layouts = self.tube, self.robot.geometry.cuts
+        start = self.robot.tube.base_length + sum(layout.length for layout in layouts[:number])
         cuts, length = layouts[number]
         bottoms = [x for cut in cuts for x, y in cut.corners if y == _bottom(cut)]
         # Of a later notch the length behind it is drawn at the tip only.
@@ -163,7 +164,7 @@ class NotchRow:
 
     def _add_depths(self, cuts: list[tuple[NotchCut, Array]]) -> None:
         """Add the cross-section at the first of some cuts, and the lengths across the tube."""
-        notch, tube, corner = self.notch, self.robot.tube, _bottom(cuts[0][0])
+        notch, tube, corner = self.notch, self.tube, _bottom(cuts[0][0])
         outer, self.radial = tube.outer_radius, cuts[0][0].radial
         bottoms = [points[points[:, 1] == points[:, 1].min(), 0] for _, points in cuts]
         self.section = float(bottoms[0].mean()), corner
@@ -311,21 +312,30 @@ def notch_rows(robot: Robot, width: float = _WIDTH) -> tuple[list[NotchRow], lis
     """Return a row for every shape of notch, and the notes that belong to them.
 
     Raises:
-        InputError: A kind of notch has no drawing.
+        InputError: A kind of notch has no drawing, or the cuts of none are known.
     """
-    shapes: dict[Notch, tuple[list[str], int]] = {}
+    shapes, unknown = dict[Notch, tuple[list[str], int]](), list[str]()
     first = 1
     for entry, notch in enumerate(robot.notch):
         last = first + notch.repeat - 1
         single = dataclasses.replace(notch, repeat=1, precurvature_deg=0.0)
-        numbers, _ = shapes.setdefault(single, ([], entry))
+        numbers = shapes.setdefault(single, ([], entry))[0] if notch.is_cut else unknown
         numbers.append(str(first) if first == last else f"{first}–{last}")
         first = last + 1
+    if not shapes:
+        raise InputError.UNSUPPORTED(
+            f"the cuts of no notch of {robot.name} are known, so there is no drawing of it; "
+            "`notchflex view` shows its bodies."
+        )
     named = [(", ".join(numbers), entry) for numbers, entry in shapes.values()]
     rows = [NotchRow(robot, entry, names, width) for names, entry in named[:MAX_SHAPES]]
     notes = ["Lengths in mm, under the names of the robot file; to scale except where broken."]
     if any(notch.precurvature_deg for notch in robot.notch):
         notes[0] += " Drawn without precurvature."
+    if len(set(robot.tubes)) > 1:
+        notes.append("Every notch is drawn as if the pieces beside it had its tube.")
+    if unknown:
+        notes.append(f"Not shown, as cuts are not known: notch {', '.join(unknown)}.")
     if others := [names for names, _ in named[MAX_SHAPES:]]:
         notes.append(f"Not shown: notches {shorten(', '.join(others), 100)}.")
     if any(tolerance.sd is not None for tolerance in robot.tolerance):
@@ -373,7 +383,8 @@ def _heading(row: NotchRow) -> str:
 
 
 def _dimensions(row: NotchRow) -> Iterator[Mark]:
-    tube, scale, outer = row.robot.tube, row.scale, row.outer
+    tube, scale, outer = row.tube, row.scale, row.outer
+    place = "tube" if row.notch.tube is None else "notch.tube"
     for level, (start, end, text) in enumerate(row.along):
         height = outer + 0.2 + _LEVEL * level
         yield from _dimension(scale * start, scale * end, height, outer, text)
@@ -381,7 +392,7 @@ def _dimensions(row: NotchRow) -> Iterator[Mark]:
         ("outer", tube.outer_diameter, outer, -0.6),
         ("inner", tube.inner_diameter, row.inner, -0.25),
     ):
-        limits = with_limits(row.robot.tolerance, f"tube.{name}_diameter", size)
+        limits = with_limits(row.robot.tolerance, f"{place}.{name}_diameter", size)
         yield from _dimension(-radius, radius, at, 0.0, upright=True)
         yield label((at - 0.1, 0.0), f"{name} diameter {limits}", turned=True)
     for number, (start, column) in enumerate(row.across):
@@ -441,7 +452,7 @@ def _side_view(row: NotchRow) -> Iterator[Mark]:
 
 def _section_view(row: NotchRow) -> Iterator[Mark]:
     """Yield the cross-section as seen from the tip, with the bend upward."""
-    radius, outer, inner = row.robot.tube.outer_radius, row.outer, row.inner
+    radius, outer, inner = row.tube.outer_radius, row.outer, row.inner
     if isinstance(row.notch, RodGap):
         yield from _backbone_section(row, row.notch)
         return

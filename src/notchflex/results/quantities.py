@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 
 from notchflex._quantity import DEGREES as DEGREES
 from notchflex._quantity import REGISTERED, Quantity
-from notchflex.solver.quantities import believable
+from notchflex.solver.quantities import believable, has_chord
 
 if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath
@@ -27,19 +27,45 @@ _BOUND_TOLERANCE = 1e-9
 
 @Quantity("path", "commanded tension", "T", "N", key="load.tension_N", per=("tendon",), after="")
 def commanded_tension(path: EquilibriumPath) -> np.ndarray:
-    """Tension commanded at the base of a tendon; empty (NaN) where it is not commanded."""
+    """Tension commanded at the drive of a tendon; empty (NaN) where it is not commanded."""
     return path.load.tension
 
 
 @Quantity("path", "commanded stroke", "u", "mm", key="load.stroke_mm", per=("tendon",),
           after="commanded_tension")  # fmt: skip
 def commanded_stroke(path: EquilibriumPath) -> np.ndarray:
-    """Tendon length commanded to be drawn out at the base; empty (NaN) where not commanded."""
+    """Way commanded of the drive of a tendon; empty (NaN) where it is not commanded."""
     return path.load.stroke
 
 
+@Quantity("path", "temperature", r"\vartheta", "deg C", column="temperature_C",
+          after="commanded_stroke", optional=lambda path: _given(path, "temperature")
+          )  # fmt: skip
+def temperature(path: EquilibriumPath) -> np.ndarray:
+    """Temperature of the robot as a load; empty (NaN) where it is that of the robot file."""
+    return _of_load(path, "temperature")
+
+
+@Quantity("path", "bend of the sheaths", r"\theta_\mathrm{s}", "deg", column="sheath_bend_deg",
+          after="temperature", optional=lambda path: _given(path, "sheath_bend_deg"))  # fmt: skip
+def sheath_bend(path: EquilibriumPath) -> np.ndarray:
+    """Total bend of all sheaths as a load; empty (NaN) where it is that of the robot file."""
+    return np.radians(_of_load(path, "sheath_bend_deg"))
+
+
+def _of_load(path: EquilibriumPath, name: str) -> np.ndarray:
+    """Return a number of the external load of every step; NaN where it is not given."""
+    return np.array([getattr(load, name) for load in path.load.external], float)
+
+
+def _given(path: EquilibriumPath, name: str) -> bool:
+    """Return whether the external load of any step gives a number."""
+    return not np.isnan(_of_load(path, name)).all()
+
+
 @Quantity("path", "total chord angle", r"\psi", "deg", key="total_chord_angle_deg",
-          column="total_chord_deg", after="chord_angle", optional=True)  # fmt: skip
+          column="total_chord_deg", after="chord_angle",
+          optional=lambda path: has_chord(path.chain).all())  # fmt: skip
 def total_chord_angle(path: EquilibriumPath) -> np.ndarray:
     """Sum of the chord angles, where every flexure has one."""
     return path.chord_angle.sum(axis=-1)
@@ -282,6 +308,10 @@ class _Quantities:
     """Commanded tension, N, shape (t)."""
     commanded_stroke = Array()
     """Commanded stroke, mm, shape (t)."""
+    temperature = Number()
+    """Temperature, deg C."""
+    sheath_bend = Number()
+    """Bend of the sheaths, rad."""
     tension = Array()
     """Tendon tension, N, shape (t)."""
     stroke = Array()
@@ -402,11 +432,18 @@ def units() -> dict[str, str]:
 
 
 def holds(path: EquilibriumPath, quantity: Quantity) -> bool:
-    """Return whether a path has a quantity; an optional one without any number is missing."""
-    values = getattr(path, quantity.name, None)
-    if values is None:
-        return False
-    return not quantity.optional or bool(np.isfinite(values).any())
+    """Return whether robot and loads of a path have any entry of a quantity."""
+    known = getattr(path, quantity.name, None) is not None
+    return known and (quantity.optional is None or bool(np.any(quantity.optional(path))))
+
+
+def entries_there(path: EquilibriumPath, quantity: Quantity) -> np.ndarray:
+    """Return which entries of a step a path has; no load gives the others a number."""
+    spans = np.asarray(path.chain.contacts) >= 0
+    ends = {("span",): spans, ("contact",): spans[:, 1:]}
+    whole = True if quantity.optional is None else quantity.optional(path)
+    there = ends.get(quantity.per[1:], whole)
+    return np.broadcast_to(there, np.shape(path.quantity(quantity.name))[1:])
 
 
 def spans_of(path: EquilibriumPath, tendon: int) -> int:

@@ -54,6 +54,12 @@ class CutLayout(NamedTuple):
     length: float
 
 
+def whole_gap(outer: float, direction_deg: float, length: float, uncut: float) -> CutLayout:
+    """Return the layout of a gap that leaves nothing of a tube of an outer radius, mm."""
+    gap = slot(direction_deg, (0.0, length), -1.5 * outer, outer)
+    return CutLayout((gap,), length + uncut)
+
+
 def slot(
     side_deg: float,
     ends: Point,

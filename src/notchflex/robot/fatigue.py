@@ -31,7 +31,7 @@ class Fatigue:
         surface: Surface of its specimens.
         source: Where it is from.
         corner_factor: Strain at the corners of the cut over that of the section (K_t); without it
-            and `corner_radius` the concentration is left out.
+            and `corner_radius` the concentration is left out. Round backbones have no corners.
         corner_radius: Radius of these corners [mm], from which the factor of cuts "on-axis" is
             known by finite elements; beyond their range a notch has no margin.
 

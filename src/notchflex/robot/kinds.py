@@ -187,7 +187,9 @@ class Tendon:
     ] = None
     sheath_friction: Annotated[
         Float | None,
-        quantity("", "coefficient of friction of wire in sheath", at_least=0, usual=(0, 0.5)),
+        quantity(
+            "", "coefficient of friction of wire in sheath", at_least=0, at_most=10, usual=(0, 0.5)
+        ),
     ] = None
     sheath_bend_deg: Annotated[
         Float | None, quantity("deg", "total angle by which the sheath is bent", at_least=0)
@@ -339,6 +341,11 @@ class Transforming:
         return 6.5 if self.plateau_slope is None else self.plateau_slope
 
     @property
+    def used_at(self) -> float | None:
+        """Temperature of use, that of the measurement where it is not given [deg C]."""
+        return self.reference_temperature if self.temperature is None else self.temperature
+
+    @property
     def plateau_shift(self) -> float:
         """By how much the stresses of the plateaus in tension are above those measured [MPa]."""
         if self.temperature is None or self.reference_temperature is None:
@@ -393,6 +400,7 @@ class Notch:
     """
 
     is_round: ClassVar[bool] = False  # whether it bends to all sides alike
+    is_cut: ClassVar[bool] = True  # whether its cuts are known, from which it can be made
     kind: str
     uncut_length: Annotated[
         Float, quantity("mm", "uncut length behind the notch, toward the tip", at_least=0)
@@ -430,6 +438,11 @@ class Notch:
     def has_elastic_ends(self) -> bool:
         """Whether its stiffness depends on the rings or walls beside it."""
         return getattr(self, "ends", "rigid") != "rigid"
+
+    @property
+    def has_lips(self) -> bool:
+        """Whether it has lips, which meet where it closes."""
+        return not self.is_round
 
     def made_of(self, material: Material) -> Any:
         """Return what its section law follows from, where the robot is of a material."""

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, WithJsonSchema
 from notchflex.errors import InputError, InputWarning
 from notchflex.robot.kinds import Notch, Tendon, Tube, openings_along
 from notchflex.robot.part import ProblemError, Problems, fields_in, unit_of, unknown_key
-from notchflex.robot.value_names import described_at, named_parts, numbers_at
+from notchflex.robot.value_names import SECTIONS, described_at, named_parts, numbers_at
 
 if TYPE_CHECKING:
     from notchflex.robot.robot import Robot
@@ -118,7 +118,10 @@ def _flat(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     for name, entry in table.items():
         if isinstance(entry, Mapping) and "." not in name:
             for key, value in cast("Mapping[str, Any]", entry).items():
-                yield f"{name}.{key}", value
+                is_part = value and key in SECTIONS and isinstance(value, Mapping)
+                own = value if is_part else {"": value}
+                for last, one in cast("Mapping[str, Any]", own).items():
+                    yield f"{name}.{key}.{last}".rstrip("."), one
         else:
             yield name, entry
 
@@ -384,9 +387,12 @@ def robot_warnings(robot: "Robot") -> Iterator[InputWarning]:
                 by_unit.setdefault((unit_of(field), other), []).append(unusual)
     for (unit, other), values in by_unit.items():
         yield _outside(values, unit, other)
-    reference = getattr(robot.material, "reference_temperature", None)
-    used = getattr(robot.material, "temperature", reference)
-    yield from too_cold(robot.material, "material.temperature", reference if used is None else used)
+    own = (
+        (f"{named.name}.", getattr(named.part, "material", None)) for named in named_parts(robot)
+    )
+    for place, material in [("", robot.material), *own]:
+        used = getattr(material, "used_at", None)
+        yield from too_cold(material, f"{place}material.temperature", used)
     if not by_unit:
         yield from _narrow_channels(robot)
         yield from _remaining_depths(robot)

@@ -222,6 +222,11 @@ def _set_key(table: dict[str, Any], target: ValuePath, value: object) -> None:
         )
     allowed: dict[str, None] = {}
     section, key, parts = _owners_at(table, target)
+    if not parts and "." in target.key:
+        raise InputError.UNKNOWN_NAME(
+            f"`{target.path}`: no {target.section} that is meant has a {section} of its own; give "
+            f"it a table [{target.section}.{section}] in the robot file, or set {section}.{key}."
+        )
     for part in parts:
         keys = fields_of(class_of(section, part))
         allowed |= dict.fromkeys(keys)

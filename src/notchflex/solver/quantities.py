@@ -50,7 +50,8 @@ def stroke(state: SolvedState) -> Array:
 
 
 @Quantity("state", "tendon tension at the base", r"T_\mathrm{b}", "N", key="base_tension_N",
-          column="tendon{tendon}_base_force_N", per=("tendon",), optional=True)  # fmt: skip
+          column="tendon{tendon}_base_force_N", per=("tendon",),
+          optional=lambda path: path.chain.sheath is not None)  # fmt: skip
 def base_tension(state: SolvedState) -> Array:
     """Tension of a tendon at the base, behind its sheath; empty (NaN) without sheaths."""
     at_base = state.solved.point.base_tension
@@ -58,7 +59,8 @@ def base_tension(state: SolvedState) -> Array:
 
 
 @Quantity("state", "tendon stroke at the base", r"u_\mathrm{b}", "mm", key="base_stroke_mm",
-          column="tendon{tendon}_base_displacement_mm", per=("tendon",), optional=True)  # fmt: skip
+          column="tendon{tendon}_base_displacement_mm", per=("tendon",),
+          optional=lambda path: path.chain.sheath is not None)  # fmt: skip
 def base_stroke(state: SolvedState) -> Array:
     """Tendon length drawn out at the base, behind its sheath; empty (NaN) without sheaths."""
     sheath = state.solved.memory.sheath
@@ -87,7 +89,7 @@ def notch_angle(state: SolvedState) -> Array:
 
 
 @Quantity("state", "edge angle", r"\phi_j", "deg", key="edge_angle_deg",
-          column="notch_{notch}_edge_deg", per=("notch",), optional=True)  # fmt: skip
+          column="notch_{notch}_edge_deg", per=("notch",))  # fmt: skip
 def edge_angle(state: SolvedState) -> Array:
     """Angle between the two faces of a notch, as a photograph shows it.
 
@@ -103,8 +105,15 @@ def edge_angle(state: SolvedState) -> Array:
     return angles - jnp.einsum("ni,ni,ni->n", chain.rods.length, beyond, curvature)
 
 
+def has_chord(chain: Chain) -> Any:
+    """Return which flexures of a chain have a chord, whose angle is an output."""
+    chord = chain.rods.chord
+    return np.zeros(chain.flexures, bool) if chord is None else np.asarray(chord) > 0.0
+
+
 @Quantity("state", "chord angle", r"\psi_j", "deg", key="chord_angle_deg",
-          column="notch_{notch}_chord_deg", per=("notch",), optional=True)  # fmt: skip
+          column="notch_{notch}_chord_deg", per=("notch",),
+          optional=lambda path: has_chord(path.chain))  # fmt: skip
 def chord_angle(state: SolvedState) -> Array:
     """Angle by which the chord of a strip has turned in its plane of bending.
 
@@ -226,7 +235,8 @@ def notch_strain(state: SolvedState) -> Array:
 
 
 @Quantity("state", "margin of fatigue", r"\varepsilon_\mathrm{m}", key="fatigue_margin",
-          column="notch_{notch}_fatigue_margin", per=("notch",), optional=True,
+          column="notch_{notch}_fatigue_margin", per=("notch",),
+          optional=lambda path: path.chain.limit is not None,
           note="NaN without a limit line, and where it is not known at a mean strain.")  # fmt: skip
 def fatigue_margin(state: SolvedState) -> Array:
     """Strain amplitude that the limit line allows less that between this state and rest.
@@ -244,7 +254,9 @@ def fatigue_margin(state: SolvedState) -> Array:
 
 
 @Quantity("state", "notch gap", "g_j", "mm", key="gap_mm", column="notch_{notch}_gap_mm",
-          per=("notch",))  # fmt: skip
+          per=("notch",), note="NaN where there are no lips, as of a backbone.",
+          optional=lambda path: np.array([notch.has_lips for notch in path.robot.notches])
+          )  # fmt: skip
 def gap(state: SolvedState) -> Array:
     """What is left of the opening of a notch between its lips, where it is narrowest."""
     return state.contact_pairs[1]

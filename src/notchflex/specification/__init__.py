@@ -8,6 +8,7 @@ from notchflex.specification.entries import (
     Criterion,
     chosen_entries,
     entry_names,
+    known_numbers,
     limited_numbers,
     load_named,
 )
@@ -48,6 +49,7 @@ __all__ = [
     "coded",
     "entry_names",
     "known",
+    "known_numbers",
     "limited_numbers",
     "load_named",
     "made",

@@ -17,7 +17,7 @@ from notchflex.specification.records import (
     check_axes,
     check_quantity,
 )
-from notchflex.support import AXES, QUANTITIES, Quantity, holds
+from notchflex.support import AXES, QUANTITIES, Quantity, entries_there
 
 
 def _first(axis: str) -> int:
@@ -124,14 +124,31 @@ def limited_numbers(
     step = len(path) if asked.step is None else asked.step
     if step > len(path):
         raise InputError.OUT_OF_RANGE(f"there is no step {step}; the load {load} has {len(path)}.")
-    if not holds(path, quantity):
+    there = entries_there(path, quantity)
+    entries = [entry for entry in chosen_entries(asked, quantity.per, there.shape) if there[entry]]
+    if not entries:
         raise InputError.UNSUPPORTED("this robot has none; choose another quantity.")
-    values = np.asarray(path.quantity(quantity.name))[step - 1]
     where = [f"at {load}"] if len(paths) > 1 else []
     where += [f"step {step}"] if asked.step is not None else []
-    for entry in chosen_entries(asked, quantity.per, values.shape):
-        if np.isfinite(values[entry]):  # else beyond the end of a tendon
-            names = ",".join(entry_names(quantity.per, entry))
-            name = f"{quantity.name}[{names}]" if names else quantity.name
-            name = " ".join([name, ", ".join(where)]).strip()
-            yield Criterion(name, quantity, load, step - 1, entry, *asked.ends)
+    for entry in entries:
+        names = ",".join(entry_names(quantity.per, entry))
+        name = f"{quantity.name}[{names}]" if names else quantity.name
+        name = " ".join([name, ", ".join(where)]).strip()
+        yield Criterion(name, quantity, load, step - 1, entry, *asked.ends)
+
+
+def known_numbers(
+    asked: LimitedQuantity, paths: Mapping[str, EquilibriumPath]
+) -> Iterator[Criterion]:
+    """Yield the same as `limited_numbers`, but refuse what is not known of these paths.
+
+    Raises:
+        InputError: A number is not known, or as there.
+    """
+    for one in limited_numbers(asked, paths):
+        if np.isnan(one.of(np.asarray(paths[one.load].quantity(one.quantity.name))[None])).any():
+            raise InputError.NOT_FINITE(
+                f"{one.name} of this robot is not known, so that it is within no limits; name "
+                "entries that are known."
+            )
+        yield one

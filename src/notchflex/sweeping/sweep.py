@@ -121,8 +121,8 @@ class Sweep(Displayed):
         """Return the rows as a lazy frame of polars, in their order.
 
         Columns are `row`, the variables, `code` and the kept quantities, in the units of files.
-        `code` is "accepted", "rejected" (outside of a limit), "NOT_CONVERGED" or "INVALID_ROBOT";
-        the last two have no quantities.
+        `code` is "accepted", "rejected" (outside of a limit, or not known where there is one),
+        "NOT_CONVERGED" or "INVALID_ROBOT"; the last two have no quantities.
 
         Raises:
             InputError: No piece is there.
@@ -453,8 +453,6 @@ class SweepTask(PieceTask):
                     if entry.name in criteria:
                         raise InputError.CONFLICT(f"{entry.name} is kept twice; keep it once.")
                     criteria[entry.name] = entry
-        if not criteria:
-            raise InputError.NO_DATA("no number is kept: the quantities have none for this robot.")
         return Study(base, (), paths, tuple(criteria.values()), None, plan.refinement, 1)
 
     @cached_property
@@ -505,7 +503,7 @@ class SweepTask(PieceTask):
         head = summed_up(columns, codes, start, self.scales, keep, failures=failures)
         code = polars.Series("code", CODES, polars.Enum(CODES)).gather(codes)
         named = {**numbers, "code": code, **columns}
-        frame = polars.DataFrame(named, nan_to_null=len(without) > 0)
+        frame = polars.DataFrame(named, nan_to_null=True)
         if not output.rows:
             rows = set(failures)
             for column in head["columns"].values():

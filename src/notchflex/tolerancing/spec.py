@@ -17,7 +17,7 @@ from notchflex.specification import (
     as_list,
     check_quantity,
     coded,
-    limited_numbers,
+    known_numbers,
     load_named,
     made,
     placed,
@@ -150,10 +150,10 @@ def criteria_of(spec: ToleranceSpec, paths: Mapping[str, EquilibriumPath]) -> li
         paths: The robot of the drawing under every load.
 
     Raises:
-        InputError: A robot or a load has no such entry or step.
+        InputError: A robot or a load has no such entry or step, or it is not known.
     """
     criteria: list[Criterion] = []
     for limit in spec.limits:
         with placed(f"the limit of {limit.quantity}"):
-            criteria += limited_numbers(limit, paths)
+            criteria += known_numbers(limit, paths)
     return criteria

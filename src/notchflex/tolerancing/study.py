@@ -189,7 +189,9 @@ class Study:
             codes[~converged.all(axis=1)] = FAILED
             codes[~quantities.valid] = INVALID
         below, above = self.beyond(values)
-        outside = (below | above | np.isnan(values)).any(axis=1)
+        limited = np.array([max(one.lower, -one.upper) > -np.inf for one in self.criteria])
+        # What is not known is within no limits.
+        outside = (below | above | np.isnan(values) & limited).any(axis=1)
         codes[(codes == ACCEPTED) & outside] = REJECTED
         return Outcomes(values, codes)
 

@@ -256,10 +256,11 @@ class Scene:
         with self.server.atomic():
             self._turn(session.pointing)
             self._move_bodies(shape)
-            allowed = self.robot.material.allowed_strain
-            strains = path.peak_strain[0].tolist()
-            for node, points, strain in zip(self._flexures, flexures, strains, strict=True):
-                node.vertices, node.color = points, rgb(strain_colour(strain, allowed))
+            materials, strains = self.robot.materials[1:], path.peak_strain[0].tolist()
+            of = zip(self._flexures, flexures, strains, materials, strict=True)
+            for node, points, strain, material in of:
+                node.vertices = points
+                node.color = rgb(strain_colour(strain, material.allowed_strain))
             self._move_marks(path, shape)
             self._move_loads(path, shape)
             self.handle.update(path.tip_position[0], shown.handle)

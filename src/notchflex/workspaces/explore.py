@@ -24,6 +24,7 @@ from notchflex import (
     Robot,
     Settings,
     closing,
+    simulate,
     simulate_batch,
     tip_response,
 )
@@ -36,9 +37,11 @@ from notchflex.pieces import (
     sobol_points,
 )
 from notchflex.specification import (
+    Criterion,
     LimitedQuantity,
     check_quantity,
     coded,
+    known_numbers,
     made,
     placed,
     whole,
@@ -252,6 +255,20 @@ class WorkspaceTask(PieceTask):
         )
 
     @cached_property
+    def criteria(self) -> list[Criterion]:
+        """The numbers that limits are about.
+
+        Raises:
+            InputError: The robot has none of a quantity, or it is not known without tensions.
+        """
+        slack, criteria = np.zeros((1, len(self.largest))), list[Criterion]()
+        for limit in self.limits:
+            path = simulate(self.robot, _under(self.load, slack))
+            with placed(f"the limit of {limit.quantity}"):
+                criteria += known_numbers(limit, {"": path})
+        return criteria
+
+    @cached_property
     def voxel(self) -> float:
         """Edge of a voxel, mm, from a few rays."""
         tips = self.states(0, _SAMPLE, _SAMPLE)[0]["tip"]
@@ -311,15 +328,14 @@ class WorkspaceTask(PieceTask):
         outputs = simulate_batch(
             self.robot,
             [_under(self.load, ray) for ray in tension],
-            outputs=[*names, "converged", *(limit.quantity for limit in self.limits)],
+            outputs=[*names, "converged", *(one.quantity.name for one in self.criteria)],
             settings=_SETTINGS,
             cores=self.cores,
         )
         within = np.asarray(outputs["converged"], bool)
-        for limit in self.limits:
-            values, (low, high) = outputs[limit.quantity], limit.ends
-            outside = (values < low) | (values > high)  # NaN marks a missing entry
-            within = within & ~outside.reshape(*within.shape, -1).any(axis=-1)
+        for one in self.criteria:
+            values = outputs[one.quantity.name][(..., *one.index)]
+            within = within & (one.lower <= values) & (values <= one.upper)
         return outputs, within
 
     def piece(self, number: int) -> tuple[DataFrame, dict[str, Any]]:
@@ -491,6 +507,7 @@ def workspace(
     number = -(-states // _STATES)
     report: Progress = progress or (lambda done, total: None)
     task = WorkspaceTask(robot, checked, load, largest, number, pretension, seed, cores)
+    assert task.criteria or not checked  # all threads need them
     if folder is None:
         pieces: list[tuple[_Columns, _Counts]] = []
         for start in range(0, number, _PIECE):

@@ -196,3 +196,8 @@ def test_what_is_refused_and_what_is_warned_of():
         nf.solve(finish, nf.Load(1.0, temperature=10.0))
     with pytest.warns(nf.InputWarning, match="below the austenite finish"):
         finish.with_value("material.temperature", 10.0)
+    own = replace(finish.notch[0], material=finish.material, repeat=2)
+    sections = MEASURED.replace(notch=[finish.notch[0], own])
+    first = finish.notch[0].repeat + 1
+    with pytest.warns(nf.InputWarning, match=rf"notch\[{first}\].material.temperature` is 10"):
+        sections.with_value(f"notch[{first}].material.temperature", 10.0)

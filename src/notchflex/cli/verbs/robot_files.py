@@ -194,7 +194,8 @@ def _asked(name: str, answers: Answers, settings: tuple[str, ...], accept_defaul
     warn_unlikely(robot)
     for option in sorted(interview.unused):
         raise InputError.UNKNOWN_NAME(
-            f"{option}: no part of this robot asks for it, or another option does."
+            f"{option}: no part of this robot asks for it: it is one of another kind, or an option "
+            "that it goes with is missing or stands in its place."
         )
     return commented(robot_text(robot), interview.answered)
 

@@ -91,21 +91,32 @@ def show(
 
 def _at_temperatures(robot: Robot) -> Iterator[dict[str, Any]]:
     """Yield plateaus and closing tensions in the workshop and in the body, where they are known."""
-    if getattr(robot.material, "reference_temperature", None) is None:
-        return
     from notchflex import closing
 
-    for temperature in (22.0, 37.0):
+    parts = {"": robot, **{f"notch[{i}].": one for i, one in enumerate(robot.notches, start=1)}}
+    places = [
+        f"{place}material.temperature" for place, part in parts.items() if _warms(part.material)
+    ]
+    for temperature in (22.0, 37.0) if places else ():
         try:
-            warm = robot.with_value("material.temperature", temperature)
+            warm = robot.with_values(dict.fromkeys(places, temperature))
         except InputError as problem:
             terminal.warn(f"{problem}")
             continue
-        plateaus: Any = vars(warm)["material"].plateaus
-        row = zip(("plateau_MPa", "lower_plateau_MPa"), plateaus, strict=False)
-        tension = closing(warm).tension.tolist()
-        ends = [min(tension), max(tension)]
-        yield {"temperature_C": temperature, **dict(row), "closing_tension_N": ends}
+        tension, alike = closing(warm).tension.tolist(), dict[Any, list[int]]()
+        for index, notch in enumerate(warm.notches):
+            alike.setdefault(notch.made_of(warm.material), []).append(index)
+        for material, members in alike.items():
+            if _warms(material):
+                of = {"notches": ", ".join(str(k + 1) for k in members)} if len(alike) > 1 else {}
+                row = zip(("plateau_MPa", "lower_plateau_MPa"), material.plateaus, strict=False)
+                ends = [function(tension[k] for k in members) for function in (min, max)]
+                yield {"temperature_C": temperature, **of, **dict(row), "closing_tension_N": ends}
+
+
+def _warms(material: Any) -> bool:
+    """Return whether the temperature counts for a material."""
+    return getattr(material, "reference_temperature", None) is not None
 
 
 def _print(robot: Robot, title: str, notches: list[dict[str, Any]]) -> None:

@@ -130,6 +130,15 @@ class TensileTest:
     ] = None
     test_temperature: Annotated[Float | None, celsius("temperature of the test")] = None
 
+    def conflicts(self) -> Problems:
+        """Find a lower plateau that is not below the upper one."""
+        if self.upper_plateau and (self.lower_plateau or 0.0) >= self.upper_plateau:
+            yield (
+                "lower_plateau",
+                f"is {self.lower_plateau:g} MPa; it must be less than `upper_plateau`, "
+                f"{self.upper_plateau:g} MPa.",
+            )
+
     def nitinol(self, **keys: Any) -> Nitinol:
         """Make the material whose tensile test gives these stresses.
 
@@ -156,8 +165,9 @@ class TensileTest:
         begins = 0.0 < loading < _LOADED * form.elastic_modulus and (unloading or loading) > 0.0
         if not (begins and last > _LOADED and reached > _UNLOADED):
             raise InputError.INVALID_ROBOT(
-                f"TensileTest: with the moduli {form.elastic_modulus:g} and {hardening:g} MPa the "
-                "stress at 3 % or at 2.5 % strain lies on no plateau; are all in MPa?"
+                f"TensileTest: with an elastic_modulus of {form.elastic_modulus:g} MPa and a "
+                f"plateau_modulus of {hardening:g} MPa no material has an upper_plateau of "
+                f"{self.upper_plateau} and a lower_plateau of {self.lower_plateau}; are all in MPa?"
             )
         return replace(
             form,

@@ -3,7 +3,7 @@
 from dataclasses import KW_ONLY
 from typing import Annotated, ClassVar, Literal
 
-from notchflex.robot.cuts import CutLayout, slot
+from notchflex.robot.cuts import CutLayout, whole_gap
 from notchflex.robot.kinds import Notch, Tendon, Tube
 from notchflex.robot.part import Float, Problems, part, quantity
 
@@ -79,9 +79,7 @@ class RodGap(Notch):
 
     def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
         """Return the whole gap, in which only the backbone is left."""
-        outer = tube.outer_radius
-        gap = slot(self.direction_deg, (0.0, self.length), -1.5 * outer, outer)  # through all
-        return CutLayout((gap,), self.length + self.uncut_length)
+        return whole_gap(tube.outer_radius, self.direction_deg, self.length, self.uncut_length)
 
     def tendon_problems(self, tendon: Tendon) -> Problems:
         """Find a tendon on an arc of the wall, which is not there."""

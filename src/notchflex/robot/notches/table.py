@@ -4,10 +4,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
+from notchflex.robot.cuts import CutLayout, whole_gap
 from notchflex.robot.kinds import Material, Notch, Tube
 from notchflex.robot.part import Float, FloatOrInf, Problems, part, quantity
 
@@ -70,12 +71,18 @@ class TableNotch(Notch):
     ] = None
     _: KW_ONLY
     kind: Literal["table"] = "table"
+    is_cut: ClassVar = False
     axis_offset: Annotated[
         Float, quantity("mm", "distance of the neutral axis from the tube axis, off the bend")
     ] = 0.0
     closing_angle_deg: Annotated[
         Float | None, quantity("deg", "angle at which it closes", above=0, below=180)
     ] = None
+
+    @property
+    def has_lips(self) -> bool:
+        """Whether it meets a stop."""
+        return self.closing_angle_deg is not None
 
     def made_of(self, material: Material) -> Any:
         """Return itself: its numbers are its law."""
@@ -94,6 +101,10 @@ class TableNotch(Notch):
             points |= {-angle: -moment for angle, moment in points.items() if angle}
         angles, moments = zip(*sorted(points.items()), strict=True)
         return angles, moments
+
+    def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
+        """Return the whole gap: what fills it is not known."""
+        return whole_gap(tube.outer_radius, self.direction_deg, self.length, self.uncut_length)
 
     @property
     def stays_in_plane(self) -> bool:
