@@ -104,9 +104,9 @@ def compared(draw: Draw, paths: list[nf.EquilibriumPath], way: str | None = None
     seconds = time.perf_counter() - start
     found += [f"a path takes {seconds:.1f} s"] if seconds > SLOW else []
     found += _parted(paths[:last], whole)
-    memory = getattr(robot.friction, "coefficient", 0.0) or "unloading_stress" in {
-        name for name, value in vars(robot.material).items() if value is not None
-    }
+    memory = getattr(robot.friction, "coefficient", 0.0)
+    memory = memory or any(getattr(one, "unloading_stress", None) for one in robot.materials)
+    memory = memory or any(one.sheath_friction or one.backlash for one in robot.tendon)
     held = paths[last - 1 :]
     if all(path.converged[0] for path in held):
         angle = [path.notch_angle[0] for path in held]

@@ -407,6 +407,7 @@ def limit_line(fatigue: Fatigue, robot: Robot) -> LimitLine | None:
     if radius is not None:
         lengths = body_lengths(robot.tube, notches)
         factors = corner_factors(radius, notches, robot.tubes[1:], lengths)
+    factors = xp.where(np.array([notch.is_round for notch in notches]), 1.0, factors)  # no corners
     mean, amplitude = (
         constant(xp.tile(xp.array(facts[key]), (len(notches), 1))) for key in ("mean", "amplitude")
     )
