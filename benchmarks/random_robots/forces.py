@@ -11,6 +11,7 @@ World frame; mm, N, N mm.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -293,6 +294,7 @@ def height_of(notch: nf.ArcNotch | nf.RodGap | nf.TableNotch) -> float:
     return notch.length if isinstance(notch, nf.RodGap | nf.TableNotch) else notch.height
 
 
+@lru_cache(maxsize=4096)
 def about_z(degrees: float) -> np.ndarray:
     """Rotation about the tube axis; its first column is a direction across the tube."""
     return Rotation.from_euler("z", degrees, degrees=True).as_matrix()

@@ -45,6 +45,8 @@ _NUDGE = 1e-6
 _SMALL = 2e-3
 # What a rigid direction may give, rad and of the length: rounding of poses.
 _RIGID = 1e-9
+# By how much more a balance may miss, at 1 rad.
+_SHARP = 30.0
 # rad, what is no bending out of a plane
 _FLAT = 1e-9
 
@@ -225,11 +227,10 @@ def _rotations(terms: np.ndarray, twist: np.ndarray) -> np.ndarray:
     size = size[:, None]
     step = 0.5 * size * (both[0] + both[1])
     step += np.sqrt(3.0) / 12.0 * size**2 * np.cross(both[0], both[1])
-    turn = np.broadcast_to(np.eye(3), (len(twist), 3, 3))
-    turns = [turn]
-    for one in np.swapaxes(step, 0, 1):
-        turn = turn @ Rotation.from_rotvec(one).as_matrix()
-        turns.append(turn)
+    steps = Rotation.from_rotvec(step.reshape(-1, 3)).as_matrix().reshape(*step.shape, 3)
+    turns = [np.broadcast_to(np.eye(3), (len(twist), 3, 3))]
+    for one in np.swapaxes(steps, 0, 1):
+        turns.append(turns[-1] @ one)
     return np.array(turns)
 
 
@@ -254,11 +255,11 @@ def _fitted(state: State, chosen: list[int], free: np.ndarray, length: np.ndarra
         return turns, Rotation.from_matrix(np.swapaxes(turn, 1, 2) @ turns[-1]).as_rotvec()
 
     twist = np.zeros(len(chosen))
-    for _ in range(3):
-        turns, off = missed(twist)
-        further = missed(twist + _NUDGE)[1] - off
-        twist = twist - np.sum(further * off, axis=1) / np.sum(further**2, axis=1) * _NUDGE
     turns, off = missed(twist)
+    further = (missed(twist + _NUDGE)[1] - off) / _NUDGE
+    for _ in range(3):
+        twist = twist - np.sum(further * off, axis=1) / np.sum(further**2, axis=1)
+        turns, off = missed(twist)
     # By Boole over every four steps: places of the nodes, and of the end.
     fours = np.stack([turns[k : len(turns) - 4 + k : 4] for k in range(5)], axis=-1)
     width = 4.0 * np.diff(_STOPS)[::4, None, None, None]
@@ -307,6 +308,9 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
     stiff = modulus * section.weak / length
     scale, pulled = size[1] + _SMALL * stiff, size[0] + _SMALL * stiff / length
     sideways, twist = stiff * fits.curved[k, :, 0], 2.0 * shear / modulus * stiff * fits.twist[k]
+    # Where it bends sharply the solver's integral of the pose is less accurate.
+    angle = np.abs(fits.curved[k]).max() + abs(fits.twist[k])
+    balance = BALANCE * (1.0 + _SHARP * angle**2)
     flat = max(np.abs(fits.curved[k, :, 0]).max(), abs(fits.twist[k])) < _FLAT
     for what, missing in (
         ("bending", (_WEIGHS * (bends - moments[:, 1])) @ powers),
@@ -315,20 +319,19 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
     ):
         # In a plane there is no term out of it, and nothing to balance.
         left = np.abs(missing).max() / scale
-        if not left < BALANCE and (what == "bending" or not flat):
+        if not left < balance and (what == "bending" or not flat):
             found.append(f"{name}: {what} out of balance by {left:.1e}")
     rigid = section.area * np.array([shear, shear, modulus])
     missing = np.abs(rigid * (fits.moves[k] - _Z) - _WEIGHS @ forces)
     # Of a thin one even rounding of the poses, and of the integral, is a large force.
-    angle = np.abs(fits.curved[k]).max() + abs(fits.twist[k])
-    seen = rigid * (1e-12 * (1.0 + state.reach / length) + 1e-8 * angle**4)
+    seen = rigid * (1e-12 * (1.0 + state.reach / length) + 1e-7 * angle**4)
     for direction, what in enumerate(("shear", "shear sideways", "stretch")):
-        if not missing[direction] < BALANCE * pulled + seen[direction]:
+        if not missing[direction] < balance * pulled + seen[direction]:
             if what != "shear sideways" or not flat:
                 left = missing[direction] / pulled
                 found.append(f"{name}: {what} out of balance by {left:.1e}")
     largest = bends[np.abs(bends).argmax()]
-    if not abs(largest - state.now.notch_moment[i]) < BALANCE * scale:
+    if not abs(largest - state.now.notch_moment[i]) < balance * scale:
         found.append(f"{name}: notch_moment is not that of its strains")
     return found
 

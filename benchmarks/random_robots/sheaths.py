@@ -25,7 +25,7 @@ _EXACT = 1e-8  # relative, of tensions; of log ratios
 # The solver keeps 12 corners, and drops the one that changes the line least.
 _CORNERS, _DROPPED = 12, 1e-3
 _LENGTH = 1e-9  # mm, below which a wire has not moved
-_STROKE = 1e-7  # of all strokes and stretches, and of the height of all notches
+_STROKE = 1e-6  # of all strokes and stretches, and of the height of all notches
 
 
 class Line(NamedTuple):
