@@ -86,7 +86,7 @@ def margin(
 
 
 def judge_margin(state: State) -> list[str]:
-    """Compare the margins of a state; the peak strains of sections without ends with their points."""
+    """Compare the margins of a state with those of its strains."""
     robot = state.robot
     if not (robot.fatigue.line or robot.fatigue.mean):
         return []
@@ -102,7 +102,7 @@ def judge_margin(state: State) -> list[str]:
         due = margin(robot, half, np.abs(half), corner, factor)
         means = (robot.fatigue.mean or LINES[robot.fatigue.line or ""][0])[-1]
         at_end = np.abs(np.abs(half).max() * max(1.0, factor) / means - 1.0) < 1e-6
-        same = abs(due - told[i]) <= _EXACT or np.isnan(due) and np.isnan(told[i])
+        same = abs(due - told[i]) <= _EXACT or (np.isnan(due) and np.isnan(told[i]))
         if not (same or at_end):
             found.append(f"notch {i + 1}: its margin is {told[i]:.6g}, not {due:.6g}")
     return found

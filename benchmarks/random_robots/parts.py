@@ -37,14 +37,18 @@ def mix_notches(
     """
     notches: list[Table] = robot["notch"]
     usual = float(np.median([stiffness(robot, notch) for notch in notches]))
-    kind = str(random.choice(["disks", "shaft", "tables", "between", "none"], p=[0.3, 0.2, 0.2, 0.1, 0.2]))
+    kind = str(
+        random.choice(["disks", "shaft", "tables", "between", "none"], p=[0.3, 0.2, 0.2, 0.1, 0.2])
+    )
     if kind == "disks":
         size = usual * _decades(random, 0.3, 30.0)
         notches[:] = [
             _gap(random, robot, planar, size * _decades(random, 0.5, 2.0), material)
             for _ in range(int(random.choice([1, 2, 3], p=[0.6, 0.25, 0.15])))
         ]
-        rows = random.multinomial(int(random.integers(len(notches), 21)), [1 / len(notches)] * len(notches))
+        rows = random.multinomial(
+            int(random.integers(len(notches), 21)), [1 / len(notches)] * len(notches)
+        )
         for notch, repeat in zip(notches, rows, strict=True):
             notch["repeat"] = max(1, int(repeat))
     elif kind == "shaft":
@@ -143,7 +147,9 @@ def _joint(random: np.random.Generator, robot: Table, planar: bool, stiffness: f
         joint["precurvature_deg"] = float(random.uniform(-10.0, 10.0))
     along = stiffness / length**2 * _decades(random, 1.0, 1e3)
     six = stiffness * np.array([_decades(random, 0.5, 50.0), 1.0, _decades(random, 0.3, 30.0)])
-    six = np.append(six, along * np.array([1.0, _decades(random, 0.3, 3.0), _decades(random, 1.0, 30.0)]))
+    six = np.append(
+        six, along * np.array([1.0, _decades(random, 0.3, 3.0), _decades(random, 1.0, 30.0)])
+    )
     most = 170.0
     if random.random() < 0.65:
         most = float(random.uniform(12.0, 60.0))
@@ -214,9 +220,14 @@ def mix_others(random: np.random.Generator, robot: Table, planar: bool, tension:
         for tendon in robot["tendon"][:2]:
             if "sheath_length" not in tendon:
                 tendon.setdefault("axial_stiffness", elastic)
-        robot["drive"] = [{"tendon": 1, "antagonist": 2, "pretension": tension * _decades(random, 0.01, 0.5)}]
+        robot["drive"] = [
+            {"tendon": 1, "antagonist": 2, "pretension": tension * _decades(random, 0.01, 0.5)}
+        ]
     for part in [robot, *robot["notch"]]:
-        if part.get("material", {}).get("kind") in ("nitinol", "superelastic") and random.random() < 0.6:
+        if (
+            part.get("material", {}).get("kind") in ("nitinol", "superelastic")
+            and random.random() < 0.6
+        ):
             part["material"] |= _temperature(random, part["material"])
     for notch in robot["notch"]:
         if notch["kind"] == "rod" and random.random() < 0.4 and robot["material"].get("density"):
@@ -228,8 +239,11 @@ def mix_others(random: np.random.Generator, robot: Table, planar: bool, tension:
 
 def _holes(random: np.random.Generator, robot: Table, planar: bool) -> None:
     """Lead tendons that end in disks through holes at other places of each."""
-    kinds = [(notch["kind"], notch["tube"]) if "tube" in notch else (notch["kind"], robot["tube"])
-             for notch in robot["notch"] for _ in range(notch["repeat"])]
+    kinds = [
+        (notch["kind"], notch["tube"]) if "tube" in notch else (notch["kind"], robot["tube"])
+        for notch in robot["notch"]
+        for _ in range(notch["repeat"])
+    ]
     disks = next((k for k, (kind, _) in enumerate(kinds) if kind != "rod"), len(kinds))
     for tendon in robot["tendon"] if disks else ():
         if disks < len(kinds) and random.random() < 0.5:
@@ -260,7 +274,9 @@ def _sheath(random: np.random.Generator, outer: float, elastic: float) -> Table:
         "sheath_wire_stiffness": elastic * _decades(random, 0.3, 30.0),
     }
     if random.random() < 0.85:
-        table["sheath_friction"] = float(random.choice([0.0, random.uniform(0.0, 0.4)], p=[0.1, 0.9]))
+        table["sheath_friction"] = float(
+            random.choice([0.0, random.uniform(0.0, 0.4)], p=[0.1, 0.9])
+        )
         table["sheath_bend_deg"] = float(random.uniform(0.0, 540.0))
     if random.random() < 0.4:
         table["sheath_stiffness"] = elastic * _decades(random, 1.0, 100.0)
@@ -270,7 +286,7 @@ def _sheath(random: np.random.Generator, outer: float, elastic: float) -> Table:
 
 
 def _temperature(random: np.random.Generator, material: Table) -> Table:
-    """Return the temperatures of a material whose plateaus stay above zero between -20 and 60 °C."""
+    """Return temperatures of a material whose plateaus stay above 0 between -20 and 60 °C."""
     lowest = material.get("unloading_stress") or material.get("plateau_stress")
     if lowest is None:
         lowest = material["elastic_modulus"] * material["transition_strain"]

@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 
 import notchflex as nf
-
 from notchflex.robot import Drive, Fatigue
 
 from .draws import POWERS, Draw, enlarged
@@ -608,7 +607,9 @@ def make_loads(rows: list[Table], robot: nf.Robot | None = None) -> tuple[nf.Loa
         turned = nf.spool_path(robot, [row["spool"] for row in rows]).stroke[1:]
     for step, row in enumerate(rows):
         forces = [nf.BodyForce(**force) for force in row.get("body_forces", [])]
-        keys = {key: value for key, value in row.items() if key != "spool"} | {"body_forces": forces}
+        keys = {key: value for key, value in row.items() if key != "spool"} | {
+            "body_forces": forces
+        }
         if turned is not None:
             for drive in robot.drive:
                 for tendon in (drive.tendon - 1, drive.antagonist - 1):

@@ -78,7 +78,9 @@ def judge_rods(state: State) -> tuple[list[str], dict[int, Bent]]:
     return [*problems, *_backbones(state)], bent
 
 
-def _ends(state: State, i: int, axis: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _ends(
+    state: State, i: int, axis: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Place and rotation of both ends of the neutral axis of a flexure."""
     frame, off = about_z(state.robot.notches[i].direction_deg), np.array([-axis, 0.0, 0.0])
     start, end = state.rotation[i] @ frame, state.rotation[i + 1] @ frame
@@ -124,15 +126,21 @@ def curve_of(notch: nf.TableNotch) -> tuple[CubicHermiteSpline, float, float]:
     for k in range(len(angle)):
         first = min(max(k - 1, 0), len(angle) - 3)
         three = slice(first, first + 3)
-        slope[k] = np.polyder(np.poly1d(np.polyfit(angle[three] - angle[k], moment[three], 2)))(0.0)
+        slope[k] = np.polyfit(angle[three] - angle[k], moment[three], 2)[1]
     flatter = np.minimum(np.append(chord, np.inf), np.append(np.inf, chord))
-    return CubicHermiteSpline(angle, moment, np.clip(slope, 0.0, 3.0 * flatter)), angle[0], angle[-1]
+    return (
+        CubicHermiteSpline(angle, moment, np.clip(slope, 0.0, 3.0 * flatter)),
+        angle[0],
+        angle[-1],
+    )
 
 
 def _table(state: State, i: int, notch: nf.TableNotch) -> tuple[list[str], Bent]:
     name, length = f"notch {i + 1}", notch.length
     begins, start, ends, end = _ends(state, i, notch.axis_offset)
-    seen = RigidTransform.from_components(start.T @ (ends - begins), Rotation.from_matrix(start.T @ end))
+    seen = RigidTransform.from_components(
+        start.T @ (ends - begins), Rotation.from_matrix(start.T @ end)
+    )
     twist = seen.as_exp_coords()
     free = np.radians(notch.precurvature_deg)
     off = twist - [0.0, free, 0.0, 0.0, 0.0, length]
@@ -326,10 +334,10 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
     # Of a thin one even rounding of the poses, and of the integral, is a large force.
     seen = rigid * (1e-12 * (1.0 + state.reach / length) + 1e-7 * angle**4)
     for direction, what in enumerate(("shear", "shear sideways", "stretch")):
-        if not missing[direction] < balance * pulled + seen[direction]:
-            if what != "shear sideways" or not flat:
-                left = missing[direction] / pulled
-                found.append(f"{name}: {what} out of balance by {left:.1e}")
+        out = not missing[direction] < balance * pulled + seen[direction]
+        if out and (what != "shear sideways" or not flat):
+            left = missing[direction] / pulled
+            found.append(f"{name}: {what} out of balance by {left:.1e}")
     largest = bends[np.abs(bends).argmax()]
     if not abs(largest - state.now.notch_moment[i]) < balance * scale:
         found.append(f"{name}: notch_moment is not that of its strains")
@@ -337,7 +345,7 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
 
 
 def masses(state: State) -> list[str]:
-    """Whether disks and backbones weigh what the robot says: sum of masses, and of their moments."""
+    """Whether disks and backbones weigh what the robot says: the sum, and that of moments."""
     robot, chain = state.robot, state.path.chain
     if robot.material.density is None or not all(isinstance(n, nf.RodGap) for n in robot.notches):
         return []

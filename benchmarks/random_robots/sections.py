@@ -93,8 +93,8 @@ def nodes(count: int) -> tuple[np.ndarray, np.ndarray]:
 def at_temperature(material: Any, load: float | None) -> Any:
     """Return a material as it is at the temperature of a load, or at its own.
 
-    The stresses of both plateaus in tension rise by the slope, 6.5 MPa/K where none is given, and in
-    compression by the ratio (Clausius and Clapeyron). Moduli and the lengths of plateaus stay.
+    The stresses of both plateaus in tension rise by the slope, 6.5 MPa/K where none is given, and
+    in compression by the ratio (Clausius and Clapeyron). Moduli and lengths of plateaus stay.
     """
     reference = getattr(material, "reference_temperature", None)
     if reference is None:

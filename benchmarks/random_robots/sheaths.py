@@ -1,9 +1,9 @@
 """Whether sheaths lead their wires by Euler's law of the rope, and remember their tension.
 
 Along a sheath ln T is a line of straight pieces between 0 (drive) and 1 (base). A wire that slides
-loses c = mu Theta over its length, in the direction in which it slides; where it sticks, T stays. So
-the tension of the drive holds the line between two others that fall and rise by c from it, and that
-of the base does the same from the other end. What was remembered before is read and judged.
+loses c = mu Theta over its length, in the direction in which it slides; where it sticks, T stays.
+So the tension of the drive holds the line between two others that fall and rise by c from it, and
+that of the base does the same from the other end. What was remembered before is read and judged.
 
 Base and drive are one contact: either the wire sticks somewhere, and what is drawn out at the base
 is taken up by the stretch from there to the base; or it slides all along, and the tensions at its
@@ -12,6 +12,7 @@ ends differ by c.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,7 +36,7 @@ class Line(NamedTuple):
     level: np.ndarray
 
     def at(self, place: np.ndarray) -> np.ndarray:
-        """ln T at places."""
+        """Ln T at places."""
         return np.interp(place, self.place, self.level)
 
     def mean(self, power: float = 1.0) -> float:
@@ -97,53 +98,54 @@ def judge_sheaths(state: State) -> list[str]:
     memories = _memories(state.path)
     if memories is None:
         return []
-    before, after = memories
-    now, found = state.now, []
-    for number, tendon in enumerate(state.robot.tendon):
-        name, soft = f"sheath {number + 1}", _compliance(tendon)
-        bend = state.load.sheath_bend_deg
-        bend = (tendon.sheath_bend_deg or 0.0) if bend is None else bend
-        limit = (tendon.sheath_friction or 0.0) * np.radians(bend)
-        old = Line(before.place[number], before.level[number]).no_steeper(limit)
-        drive, base = (max(float(each[number]), 0.0) for each in (now.tension, state.pull))
-        ends = np.log(drive + _NONE), np.log(base + _NONE)
-        from_base = (ends[1] - limit, ends[1]), (ends[1] + limit, ends[1])
-        from_drive = (ends[0], ends[0] - limit), (ends[0], ends[0] + limit)
-        line = old.between(*from_drive).between(*from_base)
-        largest = max(drive, base)
-        near = _EXACT * largest + state.rounding
-        falls = ends[0] - ends[1]
-        if abs(falls) > limit + _EXACT and largest > 1e6 * state.rounding:
-            found.append(f"{name}: friction beyond its bound by {abs(falls) - limit:.1e}")
-        told = Line(after.place[number], after.level[number])
-        at = np.union1d(line.place, told.place)
-        full = np.count_nonzero(np.diff(before.place[number]) > 0.0) >= _CORNERS - 2
-        off = np.abs(np.exp(line.at(at)) - np.exp(told.at(at))).max()
-        if off > near + full * _DROPPED * largest:
-            found.append(f"{name}: its tension is off by {off:.1e} of {largest:.1e} N")
-        ended = state.drawn[number] + soft * told.mean()
-        began = float(before.stroke[number]) + soft * Line(*(p[number] for p in before[1:3])).mean()
-        backlash, play = tendon.backlash or 0.0, float(now.stroke[number]) - ended
-        size = abs(ended) + abs(state.drawn[number]) + soft * largest + state.height
-        if not -backlash - _STROKE * size < play < _STROKE * size:
-            found.append(f"{name}: its drive is {play:.1e} mm off its wire's end")
-        moved = ended - began
-        due = 0.0 if moved > 0.0 else -backlash
-        slack = base < 1e6 * state.rounding or drive < 1e6 * state.rounding
-        if abs(moved) > max(10.0 * _LENGTH, _STROKE * size) and not slack:
-            if abs(play - due) > _STROKE * size:
-                found.append(f"{name}: its drive stands at {play:.3e} in its backlash, not {due:.3e}")
-        elif abs(moved) < 0.1 * _LENGTH and not slack and state.load.per_tendon(
-            "stroke", len(state.robot.tendon)
-        )[number] is None and abs(play - float(before.play[number])) > _STROKE * size:
-            found.append(f"{name}: its backlash changes while its wire stands")
-        # Of the way of a stuck wire: what its end is drawn out, and what it stretches from there.
-        stretch = soft * (old.between(*from_base).mean() - old.mean())
-        slip = float(state.drawn[number] - before.stroke[number]) + stretch
-        sticks = abs(slip) <= _STROKE * size
-        slides = abs(falls - np.copysign(limit, slip)) <= _EXACT
-        if not (sticks or slides or slack):
-            found.append(
-                f"{name}: slides by {slip:.1e} mm though its ends differ by {falls:.3e}, not {limit:.3e}"
-            )
-    return found
+    return [
+        f"sheath {number + 1}: {what}"
+        for number in range(state.robot.number_of_tendons)
+        for what in _judged(state, *memories, number)
+    ]
+
+
+def _judged(state: State, before: Any, after: Any, number: int) -> Iterator[str]:
+    """Tell what does not hold of one sheath."""
+    tendon, now = state.robot.tendon[number], state.now
+    soft, bend = _compliance(tendon), state.load.sheath_bend_deg
+    bend = (tendon.sheath_bend_deg or 0.0) if bend is None else bend
+    limit = (tendon.sheath_friction or 0.0) * np.radians(bend)
+    remembered = Line(before.place[number], before.level[number])
+    old = remembered.no_steeper(limit)
+    drive, base = (max(float(each[number]), 0.0) for each in (now.tension, state.pull))
+    ends = np.log(drive + _NONE), np.log(base + _NONE)
+    from_base = (ends[1] - limit, ends[1]), (ends[1] + limit, ends[1])
+    from_drive = (ends[0], ends[0] - limit), (ends[0], ends[0] + limit)
+    line = old.between(*from_drive).between(*from_base)
+    largest, falls = max(drive, base), ends[0] - ends[1]
+    slack = min(drive, base) < 1e6 * state.rounding
+    if abs(falls) > limit + _EXACT and not slack:
+        yield f"friction beyond its bound by {abs(falls) - limit:.1e}"
+    told = Line(after.place[number], after.level[number])
+    at = np.union1d(line.place, told.place)
+    full = np.count_nonzero(np.diff(before.place[number]) > 0.0) >= _CORNERS - 2
+    off = np.abs(np.exp(line.at(at)) - np.exp(told.at(at))).max()
+    if off > _EXACT * largest + state.rounding + full * _DROPPED * largest:
+        yield f"its tension is off by {off:.1e} of {largest:.1e} N"
+    ended = state.drawn[number] + soft * told.mean()
+    moved = ended - float(before.stroke[number]) - soft * remembered.mean()
+    near = abs(ended) + abs(state.drawn[number]) + soft * largest + state.height
+    near *= _STROKE
+    backlash, play = tendon.backlash or 0.0, float(now.stroke[number]) - ended
+    if not -backlash - near < play < near:
+        yield f"its drive is {play:.1e} mm off its wire's end"
+    due = 0.0 if moved > 0.0 else -backlash
+    by_tension = state.load.per_tendon("stroke", state.robot.number_of_tendons)[number] is None
+    if abs(moved) < 0.1 * _LENGTH and by_tension:
+        due = float(before.play[number])
+    elif abs(moved) < max(10.0 * _LENGTH, near):
+        due = play
+    if abs(play - due) > near and not slack:
+        yield f"its drive stands at {play:.3e} mm in its backlash, not {due:.3e}"
+    # Of the way of a stuck wire: what its end is drawn out, and what it stretches from there.
+    stretch = soft * (old.between(*from_base).mean() - old.mean())
+    slip = float(state.drawn[number] - before.stroke[number]) + stretch
+    slides = abs(falls - np.copysign(limit, slip)) <= _EXACT
+    if not (abs(slip) <= near or slides or slack):
+        yield f"slides by {slip:.1e} mm though its ends differ by {falls:.3e}, not {limit:.3e}"

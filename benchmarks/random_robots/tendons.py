@@ -128,7 +128,9 @@ def _free_lengths(state: State, number: int, stops: list[Stop]) -> list[float]:
     ]
 
 
-def _free_arc(notch: nf.ArcNotch | nf.RodGap | nf.TableNotch, off: float) -> tuple[np.ndarray, np.ndarray]:
+def _free_arc(
+    notch: nf.ArcNotch | nf.RodGap | nf.TableNotch, off: float
+) -> tuple[np.ndarray, np.ndarray]:
     """From the near face of a free arc notch, whose neutral axis is a circle, to its far one."""
     frame, angle = about_z(notch.direction_deg), np.radians(notch.precurvature_deg)
     turn = Rotation.from_rotvec([0.0, angle, 0.0]).as_matrix()
