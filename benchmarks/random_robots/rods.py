@@ -24,7 +24,7 @@ import notchflex as nf
 from .arcs import BALANCE, POSE, ArcLaw, bending
 from .forces import State, about_z, height_of
 from .rings import Ends
-from .sections import memory_of, round_section
+from .sections import left_by, memory_of, round_section
 
 _Z = np.array([0.0, 0.0, 1.0])
 # Nodes of the mean over a flexure of a table.
@@ -345,30 +345,29 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
 
 
 def masses(state: State) -> list[str]:
-    """Whether disks and backbones weigh what the robot says: the sum, and that of moments."""
-    robot, chain = state.robot, state.path.chain
-    if robot.material.density is None or not all(isinstance(n, nf.RodGap) for n in robot.notches):
+    """Whether all weighs what the robot says: the sum, and of straight backbones its moment."""
+    robot, chain, mass, first = state.robot, state.path.chain, 0.0, 0.0
+    if not all(isinstance(one, nf.RodGap | nf.TableNotch | nf.ArcNotch) for one in robot.notches):
         return []
-    first = mass = 0.0
-    place = state.length[0]
-    tube = robot.tube
-    ring = np.pi * (tube.outer_radius**2 - tube.inner_radius**2)
-    mass += 1e-6 * robot.material.density * ring * place
-    first += mass * 0.5 * place
-    for i, notch in enumerate(robot.notches):
-        tube, density = state.tubes[i + 1], state.materials[i + 1].density
+    place = 0.0
+    for i, notch in enumerate((None, *robot.notches)):
+        tube, density = state.tubes[i], state.materials[i].density or 0.0
         ring = np.pi * (tube.outer_radius**2 - tube.inner_radius**2)
-        one = 1e-6 * density * round_section(notch).area * notch.length
-        mass, first = mass + one, first + one * (place + 0.5 * notch.length)
-        place += height_of(notch)
-        one = 1e-6 * density * ring * notch.uncut_length
-        one = one if notch.disk_mass is None else notch.disk_mass
-        mass, first = mass + one, first + one * (place + 0.5 * notch.uncut_length)
-        place += notch.uncut_length
+        parts = [(ring * state.length[i], state.length[i], getattr(notch, "disk_mass", None))]
+        if notch is not None:
+            area = ring
+            if not isinstance(notch, nf.TableNotch):
+                is_round = isinstance(notch, nf.RodGap)
+                area = (round_section(notch) if is_round else left_by(notch, tube)).area
+            parts.insert(0, (area * height_of(notch), height_of(notch), None))
+        for volume, length, given in parts:
+            weight = 1e-6 * density * volume if given is None else given
+            mass, first = mass + weight, first + weight * (place + 0.5 * length)
+            place += length
     told = np.asarray(chain.body_mass)
-    starts = np.append(0.0, np.cumsum(state.length[:-1] + [height_of(n) for n in robot.notches]))
-    lever = starts + np.asarray(chain.body_centre)[:, 2]
-    off = abs(told.sum() / mass - 1.0), abs(told @ lever / first - 1.0)
-    if any(n.precurvature_deg for n in robot.notches):
-        off = off[:1]
+    heights = [height_of(notch) for notch in robot.notches]
+    starts = np.append(0.0, np.cumsum(state.length[:-1] + heights))
+    lever = told @ (starts + np.asarray(chain.body_centre)[:, 2])
+    straight = all(isinstance(n, nf.RodGap) and not n.precurvature_deg for n in robot.notches)
+    off = abs(told.sum() - mass) / (mass or 1.0), straight * abs(lever - first) / (first or 1.0)
     return [f"its bodies weigh other than it says (by {max(off):.1e})"] if max(off) > 1e-9 else []
