@@ -619,7 +619,8 @@ def _sheath_slip(
     moved = from_base(profile, log_tension(tension), limit)
     stretched = chain.sheath.compliance * (mean_tension(moved) - mean_tension(profile))
     change = tension - jnp.exp(memory.level[:, -1])
-    held = change * jnp.max(notch_heights(chain)) / chain.memory_stiffness
+    height, stiffness = jnp.max(notch_heights(chain)), chain.memory_stiffness
+    held = jnp.where(jnp.isinf(chain.axial_stiffness), change * height / stiffness, 0.0)
     return drawn - memory.stroke + stretched + held
 
 
