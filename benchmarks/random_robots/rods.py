@@ -46,7 +46,7 @@ _SMALL = 2e-3
 # What a rigid direction may give, rad and of the length: rounding of poses.
 _RIGID = 1e-9
 # By how much more a balance may miss, at 1 rad.
-_SHARP = 30.0
+_SHARP = 200.0
 # rad, what is no bending out of a plane
 _FLAT = 1e-9
 
@@ -332,7 +332,7 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
     rigid = section.area * np.array([shear, shear, modulus])
     missing = np.abs(rigid * (fits.moves[k] - _Z) - _WEIGHS @ forces)
     # Of a thin one even rounding of the poses, and of the integral, is a large force.
-    seen = rigid * (1e-12 * (1.0 + state.reach / length) + 1e-7 * angle**4)
+    seen = rigid * (1e-12 * (1.0 + state.reach / length) + 1e-6 * angle**4)
     for direction, what in enumerate(("shear", "shear sideways", "stretch")):
         out = not missing[direction] < balance * pulled + seen[direction]
         if out and (what != "shear sideways" or not flat):
