@@ -8,6 +8,8 @@ the straight limit line and the factor at the corners of a cut are written again
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 import notchflex as nf
@@ -23,17 +25,21 @@ LINES = {
 }
 
 
-def corner_factor(robot: nf.Robot, i: int, tubes: list[nf.Tube], length: np.ndarray) -> float:
+def corner_factor(robot: nf.Robot, i: int) -> float:
     """Factor at the corners of notch i (from 0); NaN where it is not known."""
-    fatigue, notch, outer = robot.fatigue, robot.notches[i], tubes[i + 1].outer_diameter
+    fatigue, notch, tube = robot.fatigue, robot.notches[i], robot.tubes[i + 1]
+    outer = tube.outer_diameter
     if isinstance(notch, nf.RodGap):
         return 1.0  # nothing is cut
     if fatigue.corner_radius is None:
         return fatigue.corner_factor or 1.0
     if not isinstance(notch, nf.ArcNotch) or notch.cut != "on-axis":
         return np.nan
-    radius, depth = fatigue.corner_radius / outer, outer_depth(notch, tubes[i + 1]) / outer
-    ring = 2.4 if i == 0 else max(length[i], length[i + 1]) / outer
+    radius, depth = fatigue.corner_radius / outer, outer_depth(notch, tube) / outer
+    # Rings are the uncut lengths beside it; a held base acts as the longest one.
+    around = (*robot.notches[: i + 2], None)
+    beside = [one.spacing(after) for one, after in pairwise(around)][max(i - 1, 0) : i + 1]
+    ring = 2.4 if i == 0 else max(beside) / outer
     known = 0.006 <= radius <= 0.1 and 0.68 <= depth <= 0.92 and ring >= 0.2
     if not known:
         return np.nan
@@ -51,9 +57,10 @@ def corner_factor(robot: nf.Robot, i: int, tubes: list[nf.Tube], length: np.ndar
     return float(np.exp(sum(factor * term for factor, term in terms.items())))
 
 
-def boundary(state: State, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def boundary(
+    notch: nf.ArcNotch | nf.RodGap, tube: nf.Tube
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places (toward the spine, and sideways) on the boundary of a section; which are corners."""
-    notch, tube = state.robot.notches[i], state.tubes[i + 1]
     if isinstance(notch, nf.RodGap):
         turn = np.pi * _ARC
         radius = 0.5 * notch.diameter
@@ -95,14 +102,45 @@ def judge_margin(state: State) -> list[str]:
     for i, notch in enumerate(robot.notches):
         if not isinstance(notch, nf.ArcNotch | nf.RodGap):
             continue
-        x, y, corner = boundary(state, i)
+        x, y, corner = boundary(notch, robot.tubes[i + 1])
         stretch, curvature, sideways = np.moveaxis(strains[i], -1, 0)[..., None]
         half = 0.5 * (stretch + curvature * x + sideways * y)
-        factor = corner_factor(robot, i, state.tubes, state.length)
+        factor = corner_factor(robot, i)
         due = margin(robot, half, np.abs(half), corner, factor)
         means = (robot.fatigue.mean or LINES[robot.fatigue.line or ""][0])[-1]
         at_end = np.abs(np.abs(half).max() * max(1.0, factor) / means - 1.0) < 1e-6
         same = abs(due - told[i]) <= _EXACT or (np.isnan(due) and np.isnan(told[i]))
         if not (same or at_end):
             found.append(f"notch {i + 1}: its margin is {told[i]:.6g}, not {due:.6g}")
+    return found
+
+
+def judge_cycle(path: nf.EquilibriumPath) -> list[str]:
+    """Compare mean and amplitude of the strains between the solved states of a path."""
+    robot, solved = path.robot, np.flatnonzero(path.converged)
+    if len(solved) < 2 or not (robot.fatigue.line or robot.fatigue.mean):
+        return []
+    cycle = nf.strain_cycle([path[int(step)] for step in solved])
+    every, found = path.solver_quantity("notch_strain")[solved], []
+    for i, notch in enumerate(robot.notches):
+        if not isinstance(notch, nf.ArcNotch | nf.RodGap):
+            continue
+        x, y, corner = boundary(notch, robot.tubes[i + 1])
+        stretch, curvature, sideways = np.moveaxis(every[:, i], -1, 0)[..., None]
+        strains = stretch + curvature * x + sideways * y
+        mean = 0.5 * (strains.max(axis=0) + strains.min(axis=0))
+        amplitude = 0.5 * np.ptp(strains, axis=0)
+        for what, own, told in (
+            ("mean", mean, cycle.mean[i, :, : len(x)]),
+            ("amplitude", amplitude, cycle.amplitude[i, :, : len(x)]),
+        ):
+            off = np.abs(own - told).max()
+            if not off < _EXACT:
+                found.append(f"notch {i + 1}: the {what} of its cycle is off by {off:.1e}")
+        factor = corner_factor(robot, i)
+        due, told = margin(robot, mean, amplitude, corner, factor), cycle.smallest_margin[i]
+        last = (robot.fatigue.mean or LINES[robot.fatigue.line or ""][0])[-1]
+        at_end = abs(np.abs(mean).max() * max(1.0, factor) / last - 1.0) < 1e-6
+        if not (abs(due - told) <= _EXACT or (np.isnan(due) and np.isnan(told)) or at_end):
+            found.append(f"notch {i + 1}: the margin of its cycle is {told:.6g}, not {due:.6g}")
     return found

@@ -11,6 +11,7 @@ import numpy as np
 
 import notchflex as nf
 
+from .cycles import judge_cycle
 from .draws import Draw, guise_of, with_neighbours
 from .judge import CONTACTS, NUMBERS, not_finite, wrong
 
@@ -103,7 +104,7 @@ def compared(draw: Draw, paths: list[nf.EquilibriumPath], way: str | None = None
     found = [] if np.array_equal(again.notch_angle, whole.notch_angle) else ["not repeatable"]
     seconds = time.perf_counter() - start
     found += [f"a path takes {seconds:.1f} s"] if seconds > SLOW else []
-    found += _parted(paths[:last], whole)
+    found += [*_parted(paths[:last], whole), *judge_cycle(whole)]
     memory = getattr(robot.friction, "coefficient", 0.0)
     memory = memory or any(getattr(one, "unloading_stress", None) for one in robot.materials)
     memory = memory or any(one.sheath_friction or one.backlash for one in robot.tendon)
