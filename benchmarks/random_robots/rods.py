@@ -45,8 +45,8 @@ _NUDGE = 1e-6
 _SMALL = 2e-3
 # What a rigid direction may give, rad and of the length: rounding of poses.
 _RIGID = 1e-9
-# By how much more a balance may miss, at 1 rad.
-_SHARP = 200.0
+# By how much more a balance may miss, at 1 rad in a plane, and about two axes; and strains (rad).
+_SHARP, _SEVERAL, _TURNED = 30.0, 300.0, 5e-6
 # rad, what is no bending out of a plane
 _FLAT = 1e-9
 
@@ -316,9 +316,12 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
     stiff = modulus * section.weak / length
     scale, pulled = size[1] + _SMALL * stiff, size[0] + _SMALL * stiff / length
     sideways, twist = stiff * fits.curved[k, :, 0], 2.0 * shear / modulus * stiff * fits.twist[k]
-    # Where it bends sharply the solver's integral of the pose is less accurate.
-    angle = np.abs(fits.curved[k]).max() + abs(fits.twist[k])
-    balance = BALANCE * (1.0 + _SHARP * angle**2)
+    # Where it bends sharply the solver's integral of the pose is less accurate, and more so about
+    # several axes: it takes states that are off by 2e-6 rad.
+    angles = *np.abs(fits.curved[k]).max(axis=0), abs(fits.twist[k])
+    angle = sum(angles)
+    several = 0.5 * (angle**2 - np.square(angles).sum())
+    balance = BALANCE * (1.0 + _SHARP * angle**2 + _SEVERAL * several)
     flat = max(np.abs(fits.curved[k, :, 0]).max(), abs(fits.twist[k])) < _FLAT
     for what, missing in (
         ("bending", (_WEIGHS * (bends - moments[:, 1])) @ powers),
@@ -332,7 +335,7 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
     rigid = section.area * np.array([shear, shear, modulus])
     missing = np.abs(rigid * (fits.moves[k] - _Z) - _WEIGHS @ forces)
     # Of a thin one even rounding of the poses, and of the integral, is a large force.
-    seen = rigid * (1e-12 * (1.0 + state.reach / length) + 1e-6 * angle**4)
+    seen = rigid * (1e-12 * (1.0 + state.reach / length) + 1e-7 * angle**4 + _TURNED * several)
     for direction, what in enumerate(("shear", "shear sideways", "stretch")):
         out = not missing[direction] < balance * pulled + seen[direction]
         if out and (what != "shear sideways" or not flat):
