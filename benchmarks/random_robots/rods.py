@@ -335,7 +335,9 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
     rigid = section.area * np.array([shear, shear, modulus])
     missing = np.abs(rigid * (fits.moves[k] - _Z) - _WEIGHS @ forces)
     # Of a thin one even rounding of the poses, and of the integral, is a large force.
-    seen = rigid * (1e-12 * (1.0 + state.reach / length) + 4e-7 * angle**4 + _TURNED * several)
+    seen = rigid * (
+        1e-12 * (1.0 + state.reach / length) + 4e-7 * (angle**4 + angle**6) + _TURNED * several
+    )
     for direction, what in enumerate(("shear", "shear sideways", "stretch")):
         out = not missing[direction] < balance * pulled + seen[direction]
         if out and (what != "shear sideways" or not flat):
