@@ -322,6 +322,7 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
     angle = sum(angles)
     several = 0.5 * (angle**2 - np.square(angles).sum())
     balance = BALANCE * (1.0 + _SHARP * angle**2 + _SEVERAL * several)
+    balance += 2.0 * float(state.now.moment_error) ** 2  # what its polynomials miss is told
     flat = max(np.abs(fits.curved[k, :, 0]).max(), abs(fits.twist[k])) < _FLAT
     for what, missing in (
         ("bending", (_WEIGHS * (bends - moments[:, 1])) @ powers),
