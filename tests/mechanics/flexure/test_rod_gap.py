@@ -182,9 +182,8 @@ def test_a_tendon_stretches_all_along_the_holes_of_its_disks() -> None:
     winding = nf.Tendon(
         5.0, 0.0, path="straight", axial_stiffness=2000.0, disk_direction_deg=tuple(160.0 * part)
     )
-    robot = backbone(4, 80.0, 1.4, winding, uncut_length=12.0).with_value(
-        "material.elastic_modulus", 1e9
-    )
+    rigid = nf.Linear(1e9, poisson_ratio=RATIO)
+    robot = backbone(4, 80.0, 1.4, winding, uncut_length=12.0).replace(material=rigid)
     state = nf.solve(robot, nf.Load(tension=1.0))
     turn = np.radians(np.append(0.0, 160.0 * part))
     place = 5.0 * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
