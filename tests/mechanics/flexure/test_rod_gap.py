@@ -180,7 +180,7 @@ def test_a_tendon_stretches_all_along_the_holes_of_its_disks() -> None:
     """Thick disks with holes that lean: nothing bends, so the stroke is stretch alone."""
     part = np.arange(1, 5) / 4
     winding = nf.Tendon(
-        5.0, 0.0, path="straight", axial_stiffness=2000.0, disk_direction_deg=tuple(160.0 * part)
+        5.0, 0.0, path="straight", axial_stiffness=20.0, disk_direction_deg=tuple(160.0 * part)
     )
     rigid = nf.Linear(1e9, poisson_ratio=RATIO)
     robot = backbone(4, 80.0, 1.4, winding, uncut_length=12.0).replace(material=rigid)
@@ -200,7 +200,7 @@ def test_a_tendon_stretches_all_along_the_holes_of_its_disks() -> None:
     ]
     length = np.linalg.norm(np.diff(np.concatenate(points), axis=0), axis=1).sum()
     length += robot.tube.base_length
-    assert state.stroke[0] == pytest.approx(length / 2000.0, rel=1e-6)
+    assert state.stroke[0] == pytest.approx(length / 20.0, rel=1e-5)
 
 
 @pytest.mark.parametrize(
