@@ -26,7 +26,7 @@ _EXACT = 1e-8  # relative, of tensions; of log ratios
 # The solver keeps 12 corners, and drops the one that changes the line least.
 _CORNERS, _DROPPED = 12, 1e-3
 _LENGTH = 1e-9  # mm, below which a wire has not moved
-_ROUNDING = 1e-10  # of strokes, over the lengths of a robot
+_ROUNDING, _ROOT = 1e-10, 1e-6  # of strokes, over the lengths of a robot; and its root
 _STROKE = 1e-6  # of all strokes and stretches, and of the height of all notches
 
 
@@ -123,11 +123,14 @@ def _judged(state: State, before: Any, after: Any, number: int) -> Iterator[str]
     slack = min(drive, base) < 1e6 * state.rounding
     if abs(falls) > limit + _EXACT and not slack:
         yield f"friction beyond its bound by {abs(falls) - limit:.1e}"
+    by_tension = state.load.per_tendon("stroke", state.robot.number_of_tendons)[number] is None
     told = Line(after.place[number], after.level[number])
     at = np.union1d(line.place, told.place)
     full = np.count_nonzero(np.diff(before.place[number]) > 0.0) >= _CORNERS - 2
     off = np.abs(np.exp(line.at(at)) - np.exp(told.at(at))).max()
-    if off > _EXACT * largest + state.rounding + full * _DROPPED * largest:
+    # A drive by stroke moves a front by the root of its rounding.
+    exact = _EXACT if by_tension else _ROOT
+    if off > exact * largest + state.rounding + full * _DROPPED * largest:
         yield f"its tension is off by {off:.1e} of {largest:.1e} N"
     ended = state.drawn[number] + soft * told.mean()
     moved = ended - float(before.stroke[number]) - soft * remembered.mean()
@@ -137,7 +140,6 @@ def _judged(state: State, before: Any, after: Any, number: int) -> Iterator[str]
     if not -backlash - near < play < near:
         yield f"its drive is {play:.1e} mm off its wire's end"
     due = 0.0 if moved > 0.0 else -backlash
-    by_tension = state.load.per_tendon("stroke", state.robot.number_of_tendons)[number] is None
     if abs(moved) < 0.1 * _LENGTH and by_tension:
         due = float(before.play[number])
     elif abs(moved) < max(10.0 * _LENGTH, near):
