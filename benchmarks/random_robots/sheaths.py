@@ -151,7 +151,7 @@ def _judged(state: State, before: Any, after: Any, number: int) -> Iterator[str]
     slip = float(state.drawn[number] - before.stroke[number]) + stretch
     # Of a drive by stroke the tension follows from a stretch, which is small in a stiff wire.
     told_by = _ROUNDING * (state.reach + state.height) / max(soft * largest, 1e-300)
-    slides = abs(falls - np.copysign(limit, slip)) <= _EXACT + told_by * (not by_tension)
+    slides = abs(falls - np.copysign(limit, slip)) <= exact + told_by * (not by_tension)
     if np.isinf(tendon.axial_stiffness):
         # The solver lets an inextensible tendon give way a little, so that its tension is known.
         change = base - np.exp(remembered.level[-1])
