@@ -137,6 +137,8 @@ def _parted(paths: list[nf.EquilibriumPath], whole: nf.EquilibriumPath) -> list[
     for step, path in enumerate(paths):
         if path.converged[0] != whole.converged[step]:
             return [f"a continued path converges otherwise from step {step} on"]
+        if not path.converged[0]:
+            return []  # beyond it a path tries no step
         off = np.abs(path.notch_angle[0] - whole.notch_angle[step]).max()
         if path.converged[0] and off > SAME:
             return [f"a continued path is another from step {step} on, by {off:.1e} rad"]
