@@ -48,6 +48,8 @@ def judged(seed: int, number: int, way: str = "") -> tuple[str, list[Outcome]]:
         robot = draw(seed, number)
     except nf.InputError as error:
         return "no robots", [Outcome(number, 0, reason=f"refused: {error}")]
+    except nf.ConvergenceError as error:
+        return "no pretension", [Outcome(number, 0, reason=f"spool: {error}")]
     outcomes, paths = [], []
     for outcome, path in follow(robot):
         outcomes.append(outcome)

@@ -150,7 +150,7 @@ def judge_arcs(state: State) -> Arcs:
         scale += abs(lip)
         inside, found = _inside(state, i, law, modes[k], memory)
         problems += found
-        floor = _SMALL * robot.material.elastic_modulus * law.section.weak
+        floor = _SMALL * state.materials[i + 1].elastic_modulus * law.section.weak
         scale += floor / height[k]
         forces = np.stack(
             [
@@ -209,7 +209,7 @@ def _inside(
     state: State, i: int, law: ArcLaw, modes: np.ndarray, memory: Memory | None
 ) -> tuple[np.ndarray, list[str]]:
     """Moments about x, y, z at the nodes by the laws of material and ends, N mm; and problems."""
-    section, material = law.section, state.robot.material
+    section, material = law.section, state.materials[i + 1]
     modulus = material.elastic_modulus
     shear = modulus / (2.0 * (1.0 + material.poisson_ratio))
     bent, problems = bending(state, i, law, modes[0] + modes[1] * _LINEAR, memory)
@@ -282,7 +282,7 @@ def _turned(rotation: np.ndarray, vector: np.ndarray) -> np.ndarray:
 def arc_law(state: State, i: int) -> ArcLaw:
     """The law of notch i (from 0)."""
     robot = state.robot
-    notch, tube, material = robot.notches[i], robot.tube, robot.material
+    notch, tube, material = robot.notches[i], state.tubes[i + 1], state.materials[i + 1]
     height, modulus, left = notch.height, material.elastic_modulus, left_by(notch, tube)
     closure, lips = tube.outer_radius + left.centroid, 0.0
     sheared = [height**3 / (12.0 * moment) for moment in (left.weak, left.strong)]
@@ -318,7 +318,8 @@ def bending(
     robot, second, spine = state.robot, law.section.weak, law.section.spine
     q = 1.0 + law.ends.odd * angle + law.ends.even * angle**2
     reduced, added = angle / (q * law.height), law.ends.weak / law.height - 1.0
-    material, rigidity = robot.material, robot.material.elastic_modulus * second
+    material = state.materials[i + 1]
+    rigidity = material.elastic_modulus * second
     if isinstance(material, nf.Linear):
         return rigidity * reduced / ((1.0 + added) * q), []
     soft, whole = (1.0 - _SHARE) * added / rigidity, 1.0 + _SHARE * added
@@ -332,7 +333,8 @@ def bending(
             return second / spine * stress(material, curvature * spine)
 
     else:
-        arm, area, problems = fibres(state.fibres, i, robot.notches[i], robot.tube)
+        arm, area, problems = fibres(state.fibres, i, robot.notches[i], state.tubes[i + 1])
+        memory = memory if getattr(material, "unloading_stress", None) is not None else None
         curve = None if memory else Curve(material)
 
         def moment(curvature: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
@@ -24,7 +24,17 @@ LENGTHS = [
     "slot_radius",
     "radius",
     "free_length",
+    "length",
+    "diameter",
+    "axis_offset",
+    "disk_radius",
+    "sheath_length",
+    "backlash",
+    "corner_radius",
 ]
+FORCES = ["axial_stiffness", "sheath_wire_stiffness", "sheath_stiffness", "pretension"]
+POWERS = dict.fromkeys(LENGTHS, 1) | dict.fromkeys(FORCES, 2) | {"moment": 3, "disk_mass": 3}
+"""By which power of its size the numbers of a robot grow while stresses stay."""
 NEAR = 1e-4  # of the size of loads: how far a neighbouring state is
 ROUNDING = 1e-13
 
@@ -96,6 +106,14 @@ def guise_of(name: str, draw: Draw, random: np.random.Generator) -> Guise:
     return Guise(draw._replace(loads=tuple(loads)))
 
 
+def enlarged(stiffness: Sequence[float], factor: float) -> np.ndarray:
+    """Return the stiffness of a table, 6 numbers or 36, that is larger by a factor of lengths."""
+    power = np.array([1.5, 1.5, 1.5, 0.5, 0.5, 0.5])
+    if len(stiffness) == 36:
+        return np.multiply(stiffness, factor ** np.add.outer(power, power).ravel())
+    return np.multiply(stiffness, factor ** (2.0 * power))
+
+
 def _mapped(draw: Draw, polar: np.ndarray, side: Callable[[float], float]) -> Draw:
     """Map all vectors: of forces as polar ones, of moments and turns as axial ones."""
     axial = np.linalg.det(polar) * polar
@@ -107,9 +125,19 @@ def _mapped(draw: Draw, polar: np.ndarray, side: Callable[[float], float]) -> Dr
         values = {name: getattr(part, name, None) for name in kinds}
         return replace(part, **{k: kinds[k] @ v for k, v in values.items() if v is not None})
 
+    def turned(part: Any) -> Any:
+        changed: dict[str, Any] = {"direction_deg": side(part.direction_deg)}
+        if sides := getattr(part, "disk_direction_deg", None):
+            changed["disk_direction_deg"] = tuple(map(side, sides))
+        numbers = getattr(part, "stiffness", None)
+        if numbers and len(numbers) == 36 and np.linalg.det(polar) < 0.0:
+            # In the frame of the notch y is mirrored: turns about x and z, and moves along y.
+            sign = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
+            changed["stiffness"] = tuple(np.multiply(numbers, np.outer(sign, sign).ravel()))
+        return replace(part, **changed)
+
     notches, tendons = (
-        tuple(replace(part, direction_deg=side(part.direction_deg)) for part in parts)
-        for parts in (draw.robot.notch, draw.robot.tendon)
+        tuple(map(turned, parts)) for parts in (draw.robot.notch, draw.robot.tendon)
     )
     loads = tuple(
         replace(mapped(load), body_forces=[mapped(one) for one in load.body_forces])
@@ -121,8 +149,7 @@ def _mapped(draw: Draw, polar: np.ndarray, side: Callable[[float], float]) -> Dr
 def _enlarged(draw: Draw, factor: float) -> Draw:
     """Enlarge lengths by a factor and forces by its square: stresses stay."""
     powers = {"tip_force": 2, "tip_moment": 3, "tip_mass": 3, "tip_point": 1, "gravity": -1}
-    powers |= {"force": 2, "moment": 3, "point": 1, "axial_stiffness": 2}
-    powers |= dict.fromkeys(LENGTHS, 1)
+    powers |= {"force": 2, "point": 1, **POWERS}
 
     def larger(part: Any, **other: Any) -> Any:
         values = {one.name: getattr(part, one.name) for one in fields(part)} | other
@@ -131,6 +158,10 @@ def _enlarged(draw: Draw, factor: float) -> Draw:
             for name, value in values.items()
             if name in powers and value is not None
         }
+        if values.get("stiffness"):
+            changed["stiffness"] = enlarged(values["stiffness"], factor).tolist()
+        if values.get("tube"):
+            changed["tube"] = larger(values["tube"])
         return replace(part, **changed)
 
     def of_load(load: nf.Load) -> nf.Load:
@@ -141,8 +172,9 @@ def _enlarged(draw: Draw, factor: float) -> Draw:
         return _commanded(made, draw, factor**2, factor)
 
     robot = draw.robot
-    parts = {name: tuple(map(larger, getattr(robot, name))) for name in ("notch", "tendon")}
-    robot = replace(robot, tube=larger(robot.tube), **parts)
+    several = ("notch", "tendon", "drive")
+    parts = {name: tuple(map(larger, getattr(robot, name))) for name in several}
+    robot = replace(robot, tube=larger(robot.tube), fatigue=larger(robot.fatigue), **parts)
     return draw._replace(robot=robot, loads=tuple(map(of_load, draw.loads)))
 
 

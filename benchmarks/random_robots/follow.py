@@ -11,6 +11,7 @@ import numpy as np
 
 import notchflex as nf
 
+from .cycles import judge_cycle
 from .draws import Draw, guise_of, with_neighbours
 from .judge import CONTACTS, NUMBERS, not_finite, wrong
 
@@ -103,10 +104,10 @@ def compared(draw: Draw, paths: list[nf.EquilibriumPath], way: str | None = None
     found = [] if np.array_equal(again.notch_angle, whole.notch_angle) else ["not repeatable"]
     seconds = time.perf_counter() - start
     found += [f"a path takes {seconds:.1f} s"] if seconds > SLOW else []
-    found += _parted(paths[:last], whole)
-    memory = getattr(robot.friction, "coefficient", 0.0) or "unloading_stress" in {
-        name for name, value in vars(robot.material).items() if value is not None
-    }
+    found += [*_parted(paths[:last], whole), *judge_cycle(whole)]
+    memory = getattr(robot.friction, "coefficient", 0.0)
+    memory = memory or any(getattr(one, "unloading_stress", None) for one in robot.materials)
+    memory = memory or any(one.sheath_friction or one.backlash for one in robot.tendon)
     held = paths[last - 1 :]
     if all(path.converged[0] for path in held):
         angle = [path.notch_angle[0] for path in held]
@@ -136,6 +137,8 @@ def _parted(paths: list[nf.EquilibriumPath], whole: nf.EquilibriumPath) -> list[
     for step, path in enumerate(paths):
         if path.converged[0] != whole.converged[step]:
             return [f"a continued path converges otherwise from step {step} on"]
+        if not path.converged[0]:
+            return []  # beyond it a path tries no step
         off = np.abs(path.notch_angle[0] - whole.notch_angle[step]).max()
         if path.converged[0] and off > SAME:
             return [f"a continued path is another from step {step} on, by {off:.1e} rad"]

@@ -3,14 +3,15 @@
 External loads, tendons and closed edges: `State` holds them with the point and the body they
 act on, so that `beyond` adds up what acts beyond a notch. Nothing is taken from the solver but
 poses, tensions along the tendons and contact forces; where a tendon leaves and enters bodies
-follows from the notches' openings. Tendons on an arc of the wall and the lips opposite a spine act
-on their own flexure alone and are no part of this (see arcs.py).
+follows from the notches' openings and the holes of the disks. Tendons on an arc of the wall and the
+lips opposite a spine act on their own flexure alone and are no part of this (see arcs.py).
 
 World frame; mm, N, N mm.
 """
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -18,6 +19,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import notchflex as nf
+
+from .sections import at_temperature
 
 _Z = np.array([0.0, 0.0, 1.0])
 # An edge this near to a face touches it, as a part of the height of the notch.
@@ -31,6 +34,20 @@ class Stop(NamedTuple):
     enters: float
     leaves: float
     faces: bool
+
+
+class Hole(NamedTuple):
+    """A hole of a tendon through a body, in the body's frame.
+
+    Attributes:
+        enters: Where it begins in a section of the tube, mm.
+        leaves: Where it ends in another, mm.
+        along: Its direction.
+    """
+
+    enters: np.ndarray
+    leaves: np.ndarray
+    along: np.ndarray
 
 
 class Force(NamedTuple):
@@ -60,6 +77,10 @@ class State:
         node_length: Length that each node of every notch stands for, mm; 0 for none.
         fibres: Those that the solver sums up, of every notch and node; None without.
         undecided: Whether a contact force is reported that may stand on either of two edges.
+        tubes: The tube of every body, base first.
+        materials: Their materials, at the temperature of the load.
+        pull: Tension of every tendon at the base, behind its sheath, N.
+        drawn: Tendon drawn out there, mm.
     """
 
     def __init__(self, robot: nf.Robot, load: nf.Load, path: nf.EquilibriumPath) -> None:
@@ -68,6 +89,12 @@ class State:
         self.node_length = path.chain.rods.length
         self.fibres = path.chain.rods.section.fibres
         self.tension = self.now.span_tension
+        self.tubes = [robot.tube, *(one.tube or robot.tube for one in robot.notches)]
+        made = [robot.material, *(one.material or robot.material for one in robot.notches)]
+        self.materials = [at_temperature(one, load.temperature) for one in made]
+        behind_sheaths = any(tendon.sheath_length for tendon in robot.tendon)
+        self.pull = self.now.base_tension if behind_sheaths else self.now.tension
+        self.drawn = self.now.base_stroke if behind_sheaths else self.now.stroke
         around = [*robot.notches[1:], None]
         behind = [one.spacing(after) for one, after in zip(robot.notches, around, strict=True)]
         self.length = np.array([robot.tube.base_length, *behind])
@@ -82,7 +109,7 @@ class State:
     @property
     def height(self) -> float:
         """Height of all notches together, mm."""
-        return sum(notch.height for notch in self.robot.notches)
+        return sum(map(height_of, self.robot.notches))
 
     @property
     def reach(self) -> float:
@@ -95,7 +122,8 @@ class State:
 
         A tendon let go, and an edge that just does not touch, have so much instead of nothing.
         """
-        return 1e-13 * self.robot.material.elastic_modulus * self.robot.tube.outer_radius**2
+        bodies = zip(self.materials, self.tubes, strict=True)
+        return 1e-13 * max(one.elastic_modulus * tube.outer_radius**2 for one, tube in bodies)
 
     def point(self, body: int, inside: np.ndarray) -> np.ndarray:
         """A point of a body in the world."""
@@ -154,6 +182,36 @@ class State:
         """Body in which a tendon ends."""
         return self.robot.tendon[number].end_body or len(self.robot.notches)
 
+    def holes(self, number: int) -> list[Hole]:
+        """Holes of a tendon through the base and all bodies up to its end.
+
+        That of a disk lies in the middle of its thickness, at the place of that disk, and halves
+        the angle between the spans on its two sides in the straight robot. In the base it is
+        parallel to the tube; where the tendon ends it goes on along the last span.
+        """
+        tendon, end = self.robot.tendon[number], self.end_body(number)
+        base = self.tendon_place(number)
+        radii = (tendon.radius, *(tendon.disk_radius or (tendon.radius,) * end))
+        side = tendon.direction_deg
+        sides = (side, *(tendon.disk_direction_deg or (side,) * end))
+        if tendon.disk_radius is None and tendon.disk_direction_deg is None:
+            return [Hole(base, base, _Z)] * (end + 1)
+        middle = [r * about_z(turn)[:, 0] for r, turn in zip(radii, sides, strict=True)]
+        spans = []
+        for body in range(1, end + 1):
+            rise = height_of(self.robot.notches[body - 1])
+            rise += 0.5 * (self.length[body - 1] + self.length[body])
+            span = middle[body] - middle[body - 1] + rise * _Z
+            spans.append(span / np.linalg.norm(span))
+        holes = [Hole(base, base, _Z)]
+        for body in range(1, end + 1):
+            along = spans[body - 1] + (spans[body] if body < end else 0.0)
+            aside = along * (0.5 * self.length[body] / along[2])
+            aside = aside - aside[2] * _Z
+            along = along / np.linalg.norm(along)
+            holes.append(Hole(middle[body] - aside, middle[body] + aside, along))
+        return holes
+
     def _external(self):
         """External loads, as the load tells them."""
         load, last, none = self.load, len(self.origin) - 1, np.zeros(3)
@@ -177,12 +235,14 @@ class State:
         tendon = self.robot.tendon[number]
         if tendon.path == "wall-arc":
             return []
-        place, none, spans = self.tendon_place(number), np.zeros(3), []
-        stops = self.stops(number)
+        none, spans = np.zeros(3), []
+        stops, holes = self.stops(number), self.holes(number)
         for i, (before, behind) in enumerate(pairwise(stops)):
-            leaves = self.point(before.body, place + before.leaves * _Z)
-            enters = self.point(behind.body, place + behind.enters * _Z)
-            channel, onward = self.rotation[before.body] @ _Z, self.rotation[behind.body] @ _Z
+            out, into = holes[before.body], holes[behind.body]
+            leaves = self.point(before.body, out.leaves + before.leaves * _Z)
+            enters = self.point(behind.body, into.enters + behind.enters * _Z)
+            channel = self.rotation[before.body] @ out.along
+            onward = self.rotation[behind.body] @ into.along
             length = float(np.linalg.norm(enters - leaves))
             along = (enters - leaves) / length if length else channel
             # Read as dead or follower the pull stands on the entry, whatever way the span goes.
@@ -216,7 +276,7 @@ class State:
                 gap = (edge - self.point(before.body, out + before.leaves * _Z)) @ normal
                 notch = behind.body - 1
                 self.gap[notch] = min(self.gap[notch], gap)
-                if gap < _TOUCHES * self.robot.notches[notch].height:
+                if gap < _TOUCHES * height_of(self.robot.notches[notch]):
                     touching.setdefault(notch, []).append((before.body, edge, normal))
         for notch in np.flatnonzero(np.isfinite(self.gap) & (reported > 0.0)):
             places = touching.get(int(notch), [])
@@ -229,6 +289,12 @@ class State:
                 ]
 
 
+def height_of(notch: nf.ArcNotch | nf.RodGap | nf.TableNotch) -> float:
+    """Length of the gap of a notch along the tube, mm."""
+    return notch.length if isinstance(notch, nf.RodGap | nf.TableNotch) else notch.height
+
+
+@lru_cache(maxsize=4096)
 def about_z(degrees: float) -> np.ndarray:
     """Rotation about the tube axis; its first column is a direction across the tube."""
     return Rotation.from_euler("z", degrees, degrees=True).as_matrix()

@@ -7,10 +7,13 @@ the load. Asked for:
 - the commands are met, and what they do not name is slack;
 - bodies are turned by rotations, notch angles and the tip are those of the poses;
 - holder, drives and loads balance on the whole robot;
-- every arc notch is in balance (arcs.py), and so are rods and links in a plane (planar_rods.py);
+- every arc notch is in balance (arcs.py), every backbone and flexure of a table (rods.py), and so
+  are rods and links in a plane (planar_rods.py);
 - tensions and contact forces are not negative, gaps neither, one of force and gap is nil;
 - tendons turn as the poses say, friction is within its bound there, opposes what slides, and
   tensions fall by it; strokes and slid lengths are those of the poses (tendons.py);
+- sheaths lead their wires by Euler's law and remember their tension (sheaths.py);
+- strains and the limit line give the margin of fatigue (cycles.py);
 - from a near state on, the work of loads and drives is energy gained and heat.
 
 No formula of the solver is called: those of sections, materials, friction and rings are written
@@ -31,9 +34,12 @@ from scipy.spatial.transform import Rotation
 import notchflex as nf
 
 from .arcs import judge_arcs
-from .forces import State, about_z
+from .cycles import judge_margin
+from .forces import State, about_z, height_of
 from .planar_rods import judge_planar_rods
+from .rods import judge_rods, masses
 from .sections import memory_of
+from .sheaths import held_by_sheaths, judge_sheaths
 from .tendons import judge_tendons
 
 EXACT = 1e-8  # relative, of what is added up
@@ -82,7 +88,18 @@ def not_finite(state: nf.Equilibrium) -> list[str]:
 
     Notches that never close have no gap. Over how many contacts a tendon runs tell its tensions.
     """
-    found = [name for name in NUMBERS if not np.isfinite(getattr(state, name)).all()]
+    notches = state.path.robot.notches
+    known = np.array([not isinstance(notch, nf.TableNotch) for notch in notches])
+    found = []
+    for name in NUMBERS:
+        values = np.asarray(getattr(state, name))
+        if name in ("outer_strain", "peak_strain"):  # of tables they are not known
+            values = values[known]
+        if not np.isfinite(values).all():
+            found.append(name)
+    if any(tendon.sheath_length for tendon in state.path.robot.tendon):
+        names = "base_tension", "base_stroke"
+        found += [name for name in names if not np.isfinite(getattr(state, name)).all()]
     due = np.isfinite(state.span_tension)
     if not due[:, 0].all():
         found.append("span_tension")
@@ -113,14 +130,18 @@ def wrong(
         return unfinished
     state = State(robot, load, path)
     arcs = judge_arcs(state)
+    of_rods, tables = judge_rods(state)
     found = [
         *_commands(load, state),
         *_poses(state),
         *_whole(state),
-        *([] if state.undecided else arcs.problems),
+        *([] if state.undecided else [*arcs.problems, *of_rods]),
+        *masses(state),
         *judge_planar_rods(state),
         *_contacts(state),
-        *judge_tendons(state, arcs),
+        *judge_tendons(state, arcs, tables),
+        *judge_sheaths(state),
+        *judge_margin(state),
     ]
     return found if before is None else [*found, *_energy(State(robot, *before), state)]
 
@@ -172,7 +193,7 @@ def _whole(state: State) -> list[str]:
     force, moment, sizes = state.beyond(0, np.zeros(3))
     # Inner forces cancel but count for the size: tendons and edges are larger than what is left.
     force, moment = force + now.base_force, moment + now.base_moment
-    for number, tension in enumerate(now.tension):
+    for number, tension in enumerate(state.pull):
         pull = state.rotation[0] @ [0.0, 0.0, -tension]
         at = np.cross(state.rotation[0] @ state.tendon_place(number), pull)
         force, moment = force + pull, moment + at
@@ -192,7 +213,7 @@ def _contacts(state: State) -> list[str]:
     """Closed notches: force and gap not negative, one of them nil, gaps those of the poses."""
     now, found = state.now, []
     force, gap = now.contact_force, now.gap
-    height = np.array([notch.height for notch in state.robot.notches])
+    height = np.array([height_of(notch) for notch in state.robot.notches])
     closes = ~np.isnan(gap)
     largest = np.abs(now.notch_moment).max() / state.robot.tube.outer_radius
     if (force < -state.rounding).any():
@@ -221,6 +242,7 @@ def _energy(before: State, state: State) -> list[str]:
     if memory_of(state.path) is not None:
         return []  # its fibres lose energy from state to state
     gained = float(second.stored_energy - first.stored_energy)
+    gained -= held_by_sheaths(state.path) - held_by_sheaths(before.path)
     work = size = 0.0
     for one, other in zip(before.external, state.external, strict=True):
         turn = Rotation.from_matrix(state.rotation[one.body] @ before.rotation[one.body].T)
@@ -230,26 +252,26 @@ def _energy(before: State, state: State) -> list[str]:
         ):
             work += 0.5 * mean @ way
             size += 0.5 * np.abs(mean * way).sum()
-    drawn = second.stroke - first.stroke
-    pulls = 0.5 * (first.tension + second.tension) * drawn
-    least = 1e-9 * max(first.tension.max(), second.tension.max())
+    drawn = state.drawn - before.drawn
+    pulls = 0.5 * (before.pull + state.pull) * drawn
+    least = 1e-9 * max(before.pull.max(), state.pull.max())
     along = 0.5 * (first.span_tension + second.span_tension)
     moved = (second.contact_slid - first.contact_slid)[:, : along.shape[1] - 1]
     rubbed = np.nan_to_num(along[:, :-1] - along[:, 1:]) * np.nan_to_num(moved)
     heat = float(rubbed.sum() + np.sum(second.material_dissipation - first.material_dissipation))
     # A tendon let go to slack rubs backward while the mean of its tensions is still forward.
-    taut = np.minimum(first.tension, second.tension) > least
+    taut = np.minimum(before.pull, state.pull) > least
     # So does a contact that turns round on the way.
     stays = (first.contact_state == second.contact_state)[:, : rubbed.shape[1]]
     lasting = float(np.where(stays, rubbed, 0.0)[taut].sum())
-    most, reach = float(second.tension.max()), float(state.length.sum()) + state.height
+    most, reach = float(state.pull.max()), float(state.length.sum()) + state.height
     reach += 2.0 * robot.tube.outer_radius
     size += float(np.nansum(along[:, :-1] * np.abs(moved))) + 1e-10 * most * reach
     size += abs(gained) + float(np.abs(pulls).sum()) + 1e-10 * abs(float(first.stored_energy))
     # Where a tendon turns round or goes slack on the way, tensions change first and strokes after:
     # the work of the drives lies anywhere between the tensions before and after.
     alike = np.array_equal(first.contact_state, second.contact_state, equal_nan=True)
-    between = 0.5 * np.abs(second.tension - first.tension) * np.abs(drawn)
+    between = 0.5 * np.abs(state.pull - before.pull) * np.abs(drawn)
     open_ = 0.0 if alike and taut.all() else float(between.sum())
     off = max(abs(gained + heat - work - float(pulls.sum())) - open_, 0.0) / max(size, 1e-300)
     found = []

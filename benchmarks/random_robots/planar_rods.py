@@ -64,7 +64,10 @@ def judge_planar_rods(state: State) -> list[str]:
     robot, problems = state.robot, []
     missed = float(state.now.moment_error * np.abs(state.now.notch_moment).max())
     for i, notch in enumerate(robot.notches):
-        if notch.has_elastic_ends or not isinstance(robot.material, nf.Linear | nf.Superelastic):
+        material = state.materials[i + 1]
+        if isinstance(notch, nf.RodGap | nf.TableNotch):
+            continue
+        if notch.has_elastic_ends or not isinstance(material, nf.Linear | nf.Superelastic):
             rod = None
         elif isinstance(notch, nf.ArcNotch):
             rod = _arc(state, i, notch)
@@ -112,7 +115,8 @@ def _strip(state: State, i: int, notch: nf.StripNotch) -> Rod:
 
 def _arc(state: State, i: int, notch: nf.ArcNotch) -> Rod:
     """The neutral axis of an arc notch, along the tube."""
-    tube, left = state.robot.tube, left_by(notch, state.robot.tube)
+    tube = state.tubes[i + 1]
+    left = left_by(notch, tube)
     before, behind = _frames(state, i)
     face = state.point(i, state.length[i] * _Z)
     couple = -float(state.now.contact_force[i]) * (tube.outer_radius + left.centroid)
@@ -148,7 +152,7 @@ def _integrated(state: State, i: int, rod: Rod, missed: float) -> list[str]:
         return about - x * pull[1] + y * pull[0]
 
     def bend(value: float) -> float:
-        return strain_of(state.robot.material, value * rod.edge / rod.second_moment) / rod.edge
+        return strain_of(state.materials[i + 1], value * rod.edge / rod.second_moment) / rod.edge
 
     def slope(_: float, here: np.ndarray) -> list[float]:
         return [-np.cos(here[2]), -np.sin(here[2]), -rod.rest - bend(asked(*here[:2]))]

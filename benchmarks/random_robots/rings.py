@@ -45,7 +45,7 @@ class Ends(NamedTuple):
 
 def ends_of(robot: nf.Robot, i: int) -> Ends:
     """Return the ends of arc notch i (from 0)."""
-    notch, tube, site = robot.notches[i], robot.tube, sites_of(robot)[i]
+    notch, tube, site = robot.notches[i], robot.tubes[i + 1], sites_of(robot)[i]
     depth = outer_depth(notch, tube)
     law = notch_stiffness(
         tube.outer_radius,

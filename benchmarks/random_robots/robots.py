@@ -3,26 +3,50 @@
 Sixteen draws after one another share a form (notches, laws, tendons, number of steps, what acts
 from outside), each with its own sizes and its own history. Half of the forms have the laws of the
 papers; the others are what a drawing of the tube gives: elastic ends, elastic closing, nitinol
-with and without hysteresis, a table of stress over strain. Tables have the keys of robot files;
-lengths in mm, forces in N, angles of robots in degrees. Some draws are no robots and are refused.
+with and without hysteresis, a table of stress over strain. Into these other parts are mixed
+(parts.py). Tables have the keys of robot files; lengths in mm, forces in N, angles of robots in
+degrees. Some draws are no robots and are refused.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 import notchflex as nf
+from notchflex.robot import Drive, Fatigue
 
-from .draws import LENGTHS, Draw
+from .draws import POWERS, Draw, enlarged
+from .parts import mix_loads, mix_notches, mix_others
 from .sections import section_of
 
 Table = dict[str, Any]
 VARIANTS = 16
-NOTCHES = {"arc": nf.ArcNotch, "strip": nf.StripNotch, "u-link": nf.ULink}
+NOTCHES = {
+    "arc": nf.ArcNotch,
+    "strip": nf.StripNotch,
+    "u-link": nf.ULink,
+    "rod": nf.RodGap,
+    "table": nf.TableNotch,
+}
+ROUND = {"arc", "rod", "table"}  # kinds over which a tendon may lie on any side
+STIFF = (
+    "elastic_modulus",
+    "superelastic_modulus",
+    "plastic_modulus",
+    "plateau_modulus",
+    "plateau_stress",
+    "unloading_stress",
+    "plateau_slope",
+    "stress",
+    "compression_stress",
+    "moment",
+)
+"""Keys of what is proportional to the stiffness of a robot."""
 MATERIALS = {
     "linear": nf.Linear,
     "superelastic": nf.Superelastic,
@@ -159,11 +183,13 @@ def draw_tendons(random: np.random.Generator, robot: Table, planar: bool) -> lis
             0.0 if number == 0 else 180.0 if number == 1 else float(random.choice([0.0, 180.0]))
         )
         if not planar:
-            direction = 360.0 / count * number if kinds == {"arc"} else direction
+            direction = 360.0 / count * number if kinds <= ROUND else direction
             direction += float(random.uniform(-20, 20))
         tendon: Table = {"radius": radius * random.uniform(0.65, 0.94), "direction_deg": direction}
         straight = {"straight": 6.0, "straight_dead": 1.0, "straight_follower": 1.0}
-        wall = {"wall_arc": 8.0} if kinds == {"arc"} else {"wall_arc": 0.08}
+        wall = {"wall_arc": 8.0} if kinds <= {"arc", "table"} else {"wall_arc": 0.08}
+        if "rod" in kinds:
+            wall, straight = {}, straight if random.random() < 0.5 else {"straight": 1.0}
         tendon["path"] = pick(random, **straight, **wall)
         if random.random() < 0.25 and bodies > 1:
             tendon["end_body"] = int(random.choice(ends_for(robot, direction)))
@@ -262,25 +288,50 @@ def tension_scale(robot: Table) -> float:
 def varied(random: np.random.Generator, robot: Table) -> None:
     """Give all sizes of a robot other values; its form, and so its program, stays."""
     size = between_decades(random, 0.2, 5.0)
-    for part in [robot["tube"], *robot["notch"], *robot["tendon"]]:
-        for key in LENGTHS:
+    parts = list(parts_of(robot))
+    for part in parts:
+        for key, power in POWERS.items():
             if part.get(key):
-                part[key] *= size * random.uniform(0.97, 1.03)
-        if "axial_stiffness" in part:
-            part["axial_stiffness"] *= size**2
+                more = random.uniform(0.97, 1.03) if power == 1 else 1.0
+                part[key] = np.multiply(part[key], size**power * more).tolist()
     stiffer, rougher = random.uniform(0.3, 1.5, 2)
-    for key, value in robot["material"].items():
-        if key.endswith(("modulus", "stress")):
-            robot["material"][key] = np.multiply(value, stiffer).tolist()
+    for part in parts:
+        for key in STIFF:
+            if part.get(key):
+                part[key] = np.multiply(part[key], stiffer).tolist()
+        if part.get("stiffness"):  # of tables: about axes and along them
+            part["stiffness"] = (enlarged(part["stiffness"], size) * stiffer).tolist()
     if "coefficient" in robot["friction"]:
         robot["friction"]["coefficient"] *= rougher
 
 
+def parts_of(robot: Table) -> Iterator[Table]:
+    """Yield all tables of a robot."""
+    for part in robot.values():
+        for table in part if isinstance(part, list) else [part]:
+            if isinstance(table, dict):
+                yield table
+                yield from parts_of(table)
+
+
 def reference(robot: Table, notch: Table) -> tuple[float, float, float]:
     """Return stiffness (N mm), a large angle and the lever (mm) of a notch, roughly."""
-    tube, material = robot["tube"], robot["material"]
+    tube, material = (notch.get(key, robot[key]) for key in ("tube", "material"))
     outer, inner = tube["outer_diameter"] / 2, tube["inner_diameter"] / 2
-    if notch["kind"] == "arc":
+    if notch["kind"] == "table":
+        if "moment" in notch:
+            angle = math.radians(notch["angle_deg"][-1])
+            stiffness = notch["moment"][-1] / angle
+        else:
+            angle, known = 0.4, notch["stiffness"]
+            stiffness = known[7 if len(known) == 36 else 1]
+        angle = min(angle, math.radians(notch.get("closing_angle_deg", 60.0)))
+        return stiffness, 0.7 * angle, outer * 0.8 + max(notch.get("axis_offset", 0.0), 0.0)
+    if notch["kind"] == "rod":
+        fibre, length = notch["diameter"] / 2, notch["length"]
+        second = math.pi / 4 * (fibre**4 - (notch.get("inner_diameter", 0.0) / 2) ** 4)
+        angle, lever = min(0.4 * length / outer, 0.5, 0.1 * length / fibre), 0.7 * outer
+    elif notch["kind"] == "arc":
         left = section_of(notch["cut"], outer, inner, notch["depth"])
         length, second, fibre = notch["height"], left.weak, left.spine
         angle = min(length / (outer + left.centroid), 0.8)
@@ -329,7 +380,8 @@ def sizes_of(robot: Table) -> tuple[float, float, float, float]:
     moment = min(stiff * angle for stiff, angle, _, _ in rows)
     length = robot["tube"]["base_length"] + robot["tube"]["outer_diameter"] * 0.5
     for notch in robot["notch"]:
-        piece = notch.get("height", 2 * notch.get("slot_radius", 0.0)) + notch["uncut_length"]
+        piece = notch.get("length", notch.get("height", 2 * notch.get("slot_radius", 0.0)))
+        piece += notch["uncut_length"]
         length += notch["repeat"] * (piece + notch.get("strip_thickness", 0.0))
     return stroke, moment, moment / length, length
 
@@ -425,6 +477,8 @@ def draw_history(
     size = float(np.exp(random.uniform(np.log(1e-3), np.log(3.0))))
     if random.random() < 0.04:
         size *= float(10 ** random.uniform(2, 6))
+    if any(notch["kind"] in ("rod", "table") for notch in robot["notch"]):
+        size = min(size, 1.0)  # nothing stops a backbone, and a table ends
     stroke = sizes_of(robot)[0]
     tendons = len(robot["tendon"])
     told: Table = {
@@ -470,15 +524,44 @@ def tables_of(seed: int, number: int) -> tuple[Table, list[Table], str]:
     if from_drawing:
         as_drawn(of_form, robot["notch"], tube)
     robot["material"] = draw_material(of_form, from_drawing)
+    mixed = np.random.default_rng([seed, number // VARIANTS, 6])
+    mix_notches(
+        mixed,
+        robot,
+        planar,
+        lambda robot, notch: reference(robot, notch)[0],
+        lambda: draw_material(mixed, from_drawing),
+    )
     robot["friction"] = draw_friction(of_form)
     robot["tendon"] = draw_tendons(of_form, robot, planar)
+    mix_others(mixed, robot, planar, tension_scale(robot))
     frame = draw_frame(of_form, len(robot["tendon"]))
     if number % VARIANTS:
         varied(random, robot)
     kinds = "+".join(sorted({notch["kind"] for notch in robot["notch"]}))
     form = f"{kinds} {'planar' if planar else 'spatial'} {robot['material']['kind']}"
     form += " elastic ends" if from_drawing else ""
-    return robot, draw_history(random, robot, planar, tension_scale(robot), frame), form
+    form += "".join(f" {word}" for word in mixed_words(robot))
+    history = draw_history(random, robot, planar, tension_scale(robot), frame)
+    mix_loads(mixed, random, robot, history, sizes_of(robot)[0])
+    return robot, history, form
+
+
+def mixed_words(robot: Table) -> Iterator[str]:
+    """Yield words for what is mixed into a robot."""
+    notches, tendons = robot["notch"], robot["tendon"]
+    if any({"tube", "material"} & notch.keys() for notch in notches):
+        yield "sections"
+    if any({"disk_radius", "disk_direction_deg"} & tendon.keys() for tendon in tendons):
+        yield "holes"
+    if any("sheath_length" in tendon for tendon in tendons):
+        yield "sheaths"
+    if "drive" in robot:
+        yield "spool"
+    if any("reference_temperature" in part for part in parts_of(robot)):
+        yield "warm"
+    if "fatigue" in robot:
+        yield "fatigue"
 
 
 def draw(seed: int, number: int) -> Draw:
@@ -487,8 +570,9 @@ def draw(seed: int, number: int) -> Draw:
     Raises:
         InputError: The library does not take what was drawn.
     """
-    robot, loads, form = tables_of(seed, number)
-    return Draw(seed, number, form, make_robot(robot), make_loads(loads))
+    table, loads, form = tables_of(seed, number)
+    robot = make_robot(table)
+    return Draw(seed, number, form, robot, make_loads(loads, robot))
 
 
 def make_robot(table: Table) -> nf.Robot:
@@ -496,17 +580,40 @@ def make_robot(table: Table) -> nf.Robot:
     return nf.Robot(
         name=table["name"],
         tube=nf.Tube(**table["tube"]),
-        notch=tuple(NOTCHES[notch["kind"]](**notch) for notch in table["notch"]),
+        notch=tuple(NOTCHES[notch["kind"]](**own_parts(notch)) for notch in table["notch"]),
         tendon=tuple(nf.Tendon(**tendon) for tendon in table["tendon"]),
         material=MATERIALS[table["material"]["kind"]](**table["material"]),
         friction=FRICTIONS[table["friction"]["kind"]](**table["friction"]),
+        fatigue=Fatigue(**table.get("fatigue", {})),
+        drive=tuple(Drive(**drive) for drive in table.get("drive", ())),
     )
 
 
-def make_loads(rows: list[Table]) -> tuple[nf.Load, ...]:
-    """Return the loads of tables."""
-    loads = []
-    for row in rows:
+def own_parts(notch: Table) -> Table:
+    """Return a notch with the tube and the material of its tables."""
+    made = dict(notch)
+    if "tube" in notch:
+        made["tube"] = nf.Tube(**notch["tube"])
+    if "material" in notch:
+        made["material"] = MATERIALS[notch["material"]["kind"]](**notch["material"])
+    return made
+
+
+def make_loads(rows: list[Table], robot: nf.Robot | None = None) -> tuple[nf.Load, ...]:
+    """Return the loads of tables; spools turn those of a robot."""
+    loads, turned = [], None
+    if robot is not None and "spool" in rows[0]:
+        # Its first step is the pretension.
+        turned = nf.spool_path(robot, [row["spool"] for row in rows]).stroke[1:]
+    for step, row in enumerate(rows):
         forces = [nf.BodyForce(**force) for force in row.get("body_forces", [])]
-        loads.append(nf.Load(**{**row, "body_forces": forces}))
+        keys = {key: value for key, value in row.items() if key != "spool"} | {
+            "body_forces": forces
+        }
+        if turned is not None:
+            for drive in robot.drive:
+                for tendon in (drive.tendon - 1, drive.antagonist - 1):
+                    keys["tension"][tendon] = None
+                    keys["stroke"][tendon] = float(turned[step, tendon])
+        loads.append(nf.Load(**keys))
     return tuple(loads)

@@ -6,6 +6,7 @@ for its own centroid would agree with any error of that centroid. mm, N, MPa, ra
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 from math import acos, cos, sin
@@ -89,6 +90,31 @@ def nodes(count: int) -> tuple[np.ndarray, np.ndarray]:
     return leggauss(count)
 
 
+def at_temperature(material: Any, load: float | None) -> Any:
+    """Return a material as it is at the temperature of a load, or at its own.
+
+    The stresses of both plateaus in tension rise by the slope, 6.5 MPa/K where none is given, and
+    in compression by the ratio (Clausius and Clapeyron). Moduli and lengths of plateaus stay.
+    """
+    reference = getattr(material, "reference_temperature", None)
+    if reference is None:
+        return material
+    own = reference if material.temperature is None else material.temperature
+    slope = 6.5 if material.plateau_slope is None else material.plateau_slope
+    rise = slope * ((own if load is None else load) - reference)
+    strain, none = rise / material.elastic_modulus, {"temperature": None}
+    if isinstance(material, nf.Superelastic):
+        first, second = material.transition_strain + strain, material.plastic_strain + strain
+        return replace(material, transition_strain=first, plastic_strain=second, **none)
+    names = "plateau_stress", "unloading_stress", "transformation_strain"
+    moved = {
+        name: value + (strain if name.endswith("strain") else rise)
+        for name in names
+        if (value := getattr(material, name)) is not None
+    }
+    return replace(material, **moved, **none)
+
+
 def stress(material: nf.Linear | nf.Superelastic, strain: np.ndarray) -> np.ndarray:
     """Stress of a fibre (Pacheco 2021, eq. 13), MPa."""
     if isinstance(material, nf.Linear):
@@ -167,7 +193,7 @@ def _plateau(material: nf.Nitinol, ratio: float) -> tuple[list[float], list[floa
 
 
 def fibres(
-    held: Any, i: int, notch: nf.ArcNotch, tube: nf.Tube
+    held: Any, i: int, notch: nf.ArcNotch | nf.RodGap, tube: nf.Tube
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:
     """Arms (mm, toward the spine) and areas of the solver's fibres of notch i, and problems.
 
@@ -179,16 +205,31 @@ def fibres(
     reach = np.abs(place).max()
     off = max(
         abs(area @ (arm / reach) ** power - size @ (place / reach) ** power) / size.sum()
-        for power in range(_POWERS if notch.ends == "rigid" else 3)
+        for power in range(3 if notch.has_elastic_ends else _POWERS)
     )
     found = [f"notch {i + 1}: fibres are off the section by {off:.1e}"] if off > _OF_SECTION else []
     return arm, area, found
 
 
-def _pieces(notch: nf.ArcNotch, tube: nf.Tube) -> tuple[np.ndarray, np.ndarray]:
+def round_section(notch: nf.RodGap) -> Left:
+    """Return the section of a round or tubular backbone."""
+    outer, inner = 0.5 * notch.diameter, 0.5 * notch.inner_diameter
+    second = np.pi / 4.0 * (outer**4 - inner**4)
+    area = np.pi * (outer**2 - inner**2)
+    return Left(area, 0.0, second, second, outer, 2.0 * second, 0.0)
+
+
+def _pieces(notch: nf.ArcNotch | nf.RodGap, tube: nf.Tube) -> tuple[np.ndarray, np.ndarray]:
     """Places from the neutral axis and areas of many pieces of a section."""
-    outer, inner, depth = tube.outer_radius, tube.inner_radius, outer_depth(notch, tube)
     points, weights = nodes(_FINE)
+    if isinstance(notch, nf.RodGap):
+        outer, inner = 0.5 * notch.diameter, 0.5 * notch.inner_diameter
+        through, weighs = nodes(24)
+        radius = 0.5 * (outer + inner) + 0.5 * (outer - inner) * through
+        place = np.outer(radius, np.cos(0.5 * np.pi * (1.0 + points))).ravel()
+        size = np.outer(radius * weighs, weights).ravel()
+        return place, size * round_section(notch).area / size.sum()
+    outer, inner, depth = tube.outer_radius, tube.inner_radius, outer_depth(notch, tube)
     if notch.cut == "on-axis":
         half = np.arccos((depth - outer) / outer)
         through, weighs = nodes(12)

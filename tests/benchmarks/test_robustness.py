@@ -13,8 +13,9 @@ from scipy.spatial.transform import Rotation
 import notchflex as nf
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
-# One form of each kind of notch, material and friction; all of them are drawn by the benchmark.
-FORMS = (2, 8, 22, 42, 48)
+# One form of each kind of notch and friction, with holes, sheaths, spools, own sections and
+# temperatures; all of them are drawn by the benchmark.
+FORMS = (3, 6, 8, 12, 24, 31, 37, 39)
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +37,46 @@ def test_a_draw_is_solved_or_says_why(robustness, form):
             assert not outcome.silent
             assert not outcome.wrong
             assert outcome.reason == "" or len(outcome.reason) > 20
+
+
+def test_wires_in_sheaths_are_judged_by_the_figures_of_a_steel_wire(robustness, margin):
+    """1 m, 180 degrees, 0.15, 0.3 mm of steel, 5 N: what arrives, where it turns, its stretch."""
+    line_of = import_module("random_robots.sheaths").Line
+    limit, soft = 0.15 * np.pi, 1000.0 / (200e3 * np.pi / 4.0 * 0.3**2)
+    place = np.linspace(0.0, 1.0, 12)
+    slack = line_of(place, 0.0 * place - 230.0)
+
+    def led(line, tension):
+        level = np.log(tension)
+        return line.between((level, level - limit), (level, level + limit))
+
+    pulled = led(slack, 5.0)
+    turn = 5.0 * np.exp(-2.0 * limit)
+    turned = led(pulled, turn * (1.0 - 1e-12))
+    figures = [
+        np.exp(pulled.level[-1]) / 5.0,
+        turn / 5.0,
+        soft * pulled.mean(),
+        soft * (pulled.mean() - turned.mean()),
+    ]
+    assert np.round(figures, 4).tolist() == [0.6242, 0.3897, 0.2820, 0.1060]
+    partly = led(pulled, 3.5)  # the front stands where both lines meet
+    front = np.log(5.0 / 3.5) / (2.0 * limit)
+    margin.within("front", partly.at(front) - np.log(5.0) + limit * front, 1e-14)
+    steep = line_of(np.array([0.0, 0.5, 1.0]), np.array([0.0, 1.0, 1.1])).no_steeper(limit)
+    margin.within("slides", steep.level - [0.0, 0.5 * limit, 0.5 * limit + 0.1], 1e-15)
+
+
+@pytest.mark.nightly
+def test_a_robot_of_many_parts_is_judged(robustness):
+    """Disks, a table, own sections, a sheath and a temperature: in balance, and no other one."""
+    spoiled = import_module("random_robots.spoiled")
+    robot, loads = spoiled.MIXED, spoiled.MIXED_LOADS
+    paths = spoiled.solved(robot, loads)
+    assert spoiled.findings(robot, paths, loads, len(loads)) == []
+    for name in ("notch[1].diameter", "notch[3].moment", "tendon[1].sheath_friction"):
+        other = robot.with_value(name, spoiled.MIXED_OTHERS[name])
+        assert spoiled.findings(other, paths, loads, len(loads)), name
 
 
 @pytest.mark.nightly

@@ -229,6 +229,22 @@ def test_one_sheath_is_the_limit_of_many_contacts(margin):
     assert errors[50] > 3.0 * errors[200], "not of first order in the number"
 
 
+def test_a_stuck_wire_gives_way_by_its_stretch_alone(margin):
+    """A force at the tip draws a soft tendon: beyond the front from the base nothing moves."""
+    plain = ready("a").with_values({"friction.kind": "frictionless", "material.kind": "linear"})
+    robot = sheathed(plain, axial_stiffness=50.0)
+    loads = [nf.Load(tension=0.8, tip_force=(-force, 0.0, 0.0)) for force in (0.0, 0.03)]
+    path = follow(robot, loads)
+    base, place = path.base_tension[:, 0], np.linspace(0.0, 1.0, 100_001)
+    before = np.log(0.8) - LIMIT * place
+    after = np.maximum(before, np.log(base[1]) - LIMIT * (1.0 - place))
+    assert base[1] > 1.02 * base[0]
+    assert after[1000] == before[1000]
+    stretch = LENGTH / STIFFNESS * np.trapezoid(np.exp(after) - np.exp(before), place)
+    margin.note(f"stretch {stretch:.3e} mm")
+    margin.within("way of the wire", np.diff(path.base_stroke[:, 0])[0] + stretch, FIGURE, "mm")
+
+
 def test_the_energy_balances(margin):
     # Work of the drive = stored + turned to heat in the wrist + in the sheath, that of a
     # chain of contacts with the same history.

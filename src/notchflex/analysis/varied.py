@@ -187,7 +187,7 @@ class Chains:
         values: dict[str, Any] = {
             name: chains[:, self.structure.indices_of(getattr(indices, name))] for name in names
         }
-        of_temperature: Any = indices.law.temperature
+        of_temperature: Any = indices.law.starts_at
         if of_temperature is not None:
             temperature: Any = chains[:, self.structure.indices_of(of_temperature)]
             values["law"] = dataclasses.replace(self.ready.chain.law, temperature=temperature)

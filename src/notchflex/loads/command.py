@@ -89,7 +89,7 @@ def body_numbers(chain: Chain) -> tuple[Any, ...]:
     """Return what loads take of a robot: masses, their moments, place of the tip, temperature."""
     mass = np.asarray(chain.body_mass)
     moment = mass[..., None] * np.asarray(chain.body_centre)
-    return mass, moment, np.asarray(chain.body_length)[..., -1], chain.law.temperature
+    return mass, moment, np.asarray(chain.body_length)[..., -1], chain.law.starts_at
 
 
 def load_slopes(load: LoadPath, chain: Chain, change: Chain) -> BodyLoads:
@@ -99,7 +99,7 @@ def load_slopes(load: LoadPath, chain: Chain, change: Chain) -> BodyLoads:
     by_moment = by_mass[..., None] * centre + mass[:, None] * np.asarray(change.body_centre)
     by_tip = np.asarray(change.body_length)[..., -1]
     steps = np.broadcast_to(np.arange(len(load)), (len(by_tip), len(load)))
-    by = by_mass, by_moment, by_tip, change.law.temperature
+    by = by_mass, by_moment, by_tip, change.law.starts_at
     none = jax.tree.map(np.zeros_like, by)
     changed, still = (applied(load, chain, steps, bodies) for bodies in (by, none))
     return jax.tree.map(operator.sub, changed, still)
@@ -313,10 +313,11 @@ def _check(external: ExternalLoad, robot: Robot) -> None:
                 f"{last}, one after each notch"
             )
     pulls = external.gravity is not None and any(external.gravity)
-    if pulls and robot.densities is None and external.tip_mass == 0.0:
+    masses = external.tip_mass, *(notch.mass for notch in robot.notches)
+    if pulls and robot.densities is None and not any(masses):
         raise InputError.UNSUPPORTED(
             f"gravity has nothing to act on: the density of {robot.name} is not known and no mass "
-            "hangs at its tip; give material.density (kg/m3) or a tip_mass (g)"
+            "hangs at its tip or stands in it; give material.density (kg/m3) or a tip_mass (g)"
         )
 
 

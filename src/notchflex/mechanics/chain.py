@@ -253,15 +253,16 @@ def body_masses(
     # (area of its sections times the length of the neutral axis) is lumped: half at the start of
     # the neutral axis on the body before it, half at its end on the body after it.
     length = body_lengths(robot.tube, robot.notches)
-    densities = robot.densities
-    if densities is None:
+    masses = [None, *(notch.mass for notch in robot.notches)]
+    if robot.densities is None and all(mass is None for mass in masses):
         return xp.zeros(len(length)), xp.zeros((len(length), 3))
+    # Where no density is known, disks of a known mass count alone.
+    densities = robot.densities or (1.0,)
     # Volumes count as those of the robot's material.
-    relative = xp.array([each / densities[0] for each in densities])
+    relative = xp.array([each / densities[0] for each in robot.densities or [0.0] * len(length)])
     radii = [(tube.outer_radius, tube.inner_radius) for tube in robot.tubes]
     outer, inner = xp.array(radii).T
     piece = np.pi * (outer**2 - inner**2) * length * relative
-    masses = [None, *(notch.mass for notch in robot.notches)]
     if any(mass is not None for mass in masses):
         given = [piece[k] if m is None else 1e6 * m / densities[0] for k, m in enumerate(masses)]
         piece = xp.stack(xp.broadcast_arrays(*given))
@@ -276,7 +277,8 @@ def body_masses(
     inside = (is_round * xp.sum(rods.length, axis=-1) / 6.0)[:, None] * TUBE_AXIS
     at_starts = before[:, None] * xp.pad(rods.start_offset + inside, ((0, 1), (0, 0)))
     at_ends = behind[:, None] * xp.pad(end - inside, ((1, 0), (0, 0)))
-    return 1e-6 * densities[0] * volume, (on_axis + at_starts + at_ends) / volume[:, None]
+    moment = on_axis + at_starts + at_ends
+    return 1e-6 * densities[0] * volume, moment / xp.where(volume > 0.0, volume, 1.0)[:, None]
 
 
 # Whether a robot stays in one plane under its tendons alone.

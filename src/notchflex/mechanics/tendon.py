@@ -444,6 +444,8 @@ def _straight(
         point = (point - translation) @ rotation
         across.append(inward - point)
         point = xp.where(visits[:, None] > 0.0, outward, point)
+    # A hole that leans is longer than its disk is thick.
+    masks["body_length"] = masks["body_length"] / along[1:, :, 2]
     return Straight(
         **masks,
         **options,

@@ -298,7 +298,7 @@ def unloaded(chain: Chain) -> BodyLoads | None:
         return None
     bodies = chain.flexures + 1
     d, a = (3, 3) if chain.frame is None else (2, 1)
-    shapes = ((d,), (a,), (d, d), (a + d,), *[()] * (chain.law.temperature is not None))
+    shapes = ((d,), (a,), (d, d), (a + d,), *[()] * (chain.law.starts_at is not None))
     return BodyLoads(*(constant(np.zeros((bodies, *shape))) for shape in shapes))
 
 
@@ -608,8 +608,9 @@ def command_residual(
     # Of a tendon that is inextensible in the robot the tension could be any while all contacts
     # stick: the memory's stiffness keeps it.
     change = tension - jnp.exp(memory.level[:, -1])
-    held = change * jnp.max(notch_heights(chain)) / chain.memory_stiffness
-    slip = drawn - memory.stroke + stretched + held
+    height, stiffness = jnp.max(notch_heights(chain)), chain.memory_stiffness
+    kept = jnp.where(jnp.isinf(chain.axial_stiffness), change * height / stiffness, 0.0)
+    slip = drawn - memory.stroke + stretched + kept
     held = jnp.where(slip <= toward_base, toward_base, slip)
     return jnp.where(slip >= toward_drive, toward_drive, held)
 

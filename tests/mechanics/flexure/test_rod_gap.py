@@ -163,6 +163,46 @@ def test_weight_of_a_backbone_and_its_disks() -> None:
     assert state.tip_position[0] == pytest.approx(sag, rel=2e-3)
 
 
+def test_disks_of_a_known_mass_weigh_without_a_density() -> None:
+    """Disks alone, on a backbone without weight; a mass at the tip changes nothing of that."""
+    robot = backbone(4, 80.0, disk_mass=0.5)
+    assert robot.material.density is None
+    assert robot.geometry.body_mass == pytest.approx([0.0, 0.5, 0.5, 0.5, 0.5])
+    for load, mass in ((nf.Load(gravity=(9.81, 0.0, 0.0)), 2.0),
+                       (nf.Load(gravity=(9.81, 0.0, 0.0), tip_mass=1.0), 3.0)):  # fmt: skip
+        state = nf.solve(robot, load)
+        assert state.base_force[0] == pytest.approx(-9.81e-3 * mass)
+    lighter = nf.solve(robot.with_value("notch.disk_mass", 0.0), nf.Load(tip_mass=1.0))
+    assert lighter.converged
+
+
+def test_a_tendon_stretches_all_along_the_holes_of_its_disks() -> None:
+    """Thick disks with holes that lean: nothing bends, so the stroke is stretch alone."""
+    part = np.arange(1, 5) / 4
+    winding = nf.Tendon(
+        5.0, 0.0, path="straight", axial_stiffness=20.0, disk_direction_deg=tuple(160.0 * part)
+    )
+    rigid = nf.Linear(1e9, poisson_ratio=RATIO)
+    robot = backbone(4, 80.0, 1.4, winding, uncut_length=12.0).replace(material=rigid)
+    state = nf.solve(robot, nf.Load(tension=1.0))
+    turn = np.radians(np.append(0.0, 160.0 * part))
+    place = 5.0 * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
+    gap, thick = robot.notches[0].length, 12.0
+    rises = gap + thick * np.array([0.5, 1.0, 1.0, 1.0])
+    spans = np.diff(place, axis=0) + rises[:, None] * np.eye(3)[2]
+    along = spans / np.linalg.norm(spans, axis=1)[:, None]
+    both = along + np.append(along[1:], np.zeros((1, 3)), axis=0)
+    enters, leaves = (place[1:] + side * 0.5 * thick * both / both[:, 2:] for side in (-1.0, 1.0))
+    middle = np.append(0.0, np.cumsum(rises))[1:, None] * np.eye(3)[2]
+    points = [
+        place[:1],
+        *(np.stack(pair) + at for *pair, at in zip(enters, leaves, middle, strict=True)),
+    ]
+    length = np.linalg.norm(np.diff(np.concatenate(points), axis=0), axis=1).sum()
+    length += robot.tube.base_length
+    assert state.stroke[0] == pytest.approx(length / 20.0, rel=1e-5)
+
+
 @pytest.mark.parametrize(
     "material",
     [

@@ -128,6 +128,21 @@ def test_a_load_moves_the_plateaus_as_by_hand():
     assert len(loaded.prepared.long.programs) == 1
 
 
+def test_a_load_warms_notches_beside_a_table():
+    """As the robot does at that temperature, alone and among others with other numbers."""
+    joint = nf.TableNotch(2.0, angle_deg=(5.0, 20.0), moment=(1.0, 3.0), uncut_length=1.0)
+    robot = MEASURED.replace(notch=(joint, *MEASURED.notch))
+    warm = nf.Load(tension=1.0, temperature=37.0)
+    there = nf.solve(robot.with_value("material.temperature", 37.0), nf.Load(tension=1.0))
+    cold = nf.solve(robot, nf.Load(tension=1.0))
+    assert np.abs(nf.solve(robot, warm).notch_angle - there.notch_angle).max() < 1e-12
+    assert cold.notch_angle[1] - there.notch_angle[1] > np.radians(0.5)
+    other = robot.with_value("material.plateau_stress", 300.0)
+    rows = nf.solve_batch([robot, other], warm, outputs=("notch_angle",))["notch_angle"]
+    assert np.abs(rows[0] - there.notch_angle).max() < 1e-9
+    assert np.abs(rows[1] - nf.solve(other, warm).notch_angle).max() < 1e-9
+
+
 def test_batches_states_files_and_slopes_know_the_temperature(tmp_path):
     robot = with_memory()
     path = nf.pull(0.0, 1.2, steps=4).release().loaded(temperature=np.linspace(22.0, 36.0, 8))

@@ -369,6 +369,11 @@ class Law(Pytree):
         del before, after
         return xp.zeros(xp.shape(section.area))
 
+    @property
+    def starts_at(self) -> Scalar | None:
+        """Temperature from which loads warm it, deg C; None where it does not count."""
+        return self.temperature
+
     def warmed(self, rise: Scalar) -> Self:
         """Return the law at a higher temperature, K; what has transformed stays."""
         assert self.moves is not None
@@ -561,6 +566,20 @@ class MixedLaw(Law):
     def remembers(self) -> bool:
         """Whether any of them does."""
         return any(law.remembers for law in self.laws)
+
+    @property
+    def starts_at(self) -> Scalar | None:
+        """That of the one material which loads may warm, beside tables."""
+        each = (law.temperature[..., 0] for law in self.laws if law.temperature is not None)
+        return next(each, None) if self.temperature is None else self.temperature
+
+    def warmed(self, rise: Scalar) -> Self:
+        """Return the laws at a higher temperature, K."""
+        laws = (
+            law if law.moves is None else jax.vmap(type(law).warmed, (0, None))(law, rise)
+            for law in self.laws
+        )  # fmt: skip
+        return dataclasses.replace(self, laws=tuple(laws))
 
     def rest(self, section: FibreSection) -> Any:
         """Return the memory of free sections, which serves all laws that remember."""
