@@ -230,7 +230,7 @@ def _geometric_in_space(
     end = state.rotation[-1]
     moment, force = end @ end_wrench[:3], end @ end_wrench[3:]
     crossed = jax.vmap(cross, in_axes=(0, None))
-    left = state.turn[-1] - jnp.concatenate([jnp.zeros_like(state.turn[:1]), state.turn])
+    left = state.turn[-1:] - jnp.concatenate([jnp.zeros_like(state.turn[:1]), state.turn])
     moved = state.stepped - jax.vmap(cross)(left[1:-1], state.step[..., None])
     shares = jnp.concatenate([crossed(state.step, force), moment[None]])
     beyond = jnp.cumsum(shares[::-1], axis=0)[::-1]
