@@ -17,7 +17,7 @@ def circling(robot: nf.Robot, slack: float, stroke: float, turns: float, steps: 
 
 
 @pytest.mark.parametrize(("friction", "stiffness"), [(0.1, 1e3), (0.3, 1e3), (0.5, 200.0)])
-def test_contacts_at_constant_base_tension_are_found(friction, stiffness):
+def test_contacts_at_constant_base_tension_are_found(friction: float, stiffness: float) -> None:
     """Each step takes few iterations, though tendons that keep their tension slide as well."""
     robot = nf.load_robot("two-axis-wrist").replace(friction=nf.Capstan(friction))
     robot = robot.with_value("tendon.axial_stiffness", stiffness)
@@ -28,7 +28,7 @@ def test_contacts_at_constant_base_tension_are_found(friction, stiffness):
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.3])
-def test_thirty_notches_are_followed(friction):
+def test_thirty_notches_are_followed(friction: float) -> None:
     """Where contacts are not found directly, the rest of a load goes on as they were found."""
     short = nf.load_robot("two-axis-wrist")
     notches = tuple(short.notches[number % short.number_of_notches] for number in range(30))

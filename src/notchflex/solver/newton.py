@@ -209,21 +209,15 @@ def newton(
         solved = accept & (largest < target)
         within = solved | (largest < _ROUNDING * tolerance)
         new = _result(chain, command, trial, evaluation, largest, best.iterations + 1, within)
-        falls_fast = (largest < _PREDICTOR_FALL * best.residual) | ~accept
-        falls_fast = falls_fast | (best.iterations < _PREDICTOR_SURE_STEPS)
-        predicts = search.predicts & (best.iterations < _PREDICTOR_STEPS) & falls_fast
-        predicts = predicts & (largest > _PREDICTOR_MIN_RESIDUAL)
-        step, fraction = jax.lax.cond(
+        following = jax.lax.cond(
             accept & ~solved,
-            lambda: _next_step(problem, new, evaluation, predicts),
-            lambda: (search.step, 0.5 * search.fraction),
+            lambda: _next_step(problem, new, evaluation, search),
+            lambda: (search.predicts, search.step, 0.5 * search.fraction),
         )
         return _Iteration(
-            best=choose(accept, new, best),
-            allowed=jnp.where(accept, (1.0 - 1e-4) * size, search.allowed),
-            predicts=predicts,
-            step=step,
-            fraction=fraction,
+            choose(accept, new, best),
+            jnp.where(accept, (1.0 - 1e-4) * size, search.allowed),
+            *following,
             backtracks=jnp.where(accept, 0, search.backtracks + 1),
             terminate=solved | at_rounding | (~accept & exhausted),
         )
@@ -306,9 +300,9 @@ def _result(
 
 
 def _next_step(
-    problem: NewtonProblem, new: NewtonResult, evaluation: Evaluation, early: Bool[Array, ""]
-) -> tuple[Iterate, Float[Array, ""]]:
-    """Return the step from an accepted point, and the fraction of it to try first."""
+    problem: NewtonProblem, new: NewtonResult, evaluation: Evaluation, search: _Iteration
+) -> tuple[Bool[Array, ""], Iterate, Float[Array, ""]]:
+    """Return whether the predictor goes on, the step from here, and the fraction to try first."""
     chain, command, memory, last, predicts = problem
     point = new.point
     step = linear_step(chain, command, point, memory, evaluation)
@@ -322,9 +316,13 @@ def _next_step(
     max_fraction = jnp.minimum(1.0, _MAX_ROTATION_STEP / rotation)
     linear_fraction = jnp.minimum(max_fraction, MAX_LOG_RATIO_STEP / log_ratio)
     if by_tension:
-        return limited(linear_fraction), linear_fraction
+        return search.predicts, limited(linear_fraction), linear_fraction
     assert command.by_stroke is not None
-    early = jnp.any(command.by_stroke) & early
+    before = search.best
+    helps = new.residual < _PREDICTOR_FALL * before.residual
+    helps = helps | (before.iterations < _PREDICTOR_SURE_STEPS)
+    early = search.predicts & helps & (before.iterations < _PREDICTOR_STEPS)
+    early = jnp.any(command.by_stroke) & early & (new.residual > _PREDICTOR_MIN_RESIDUAL)
 
     def predicted() -> Iterate:
         limits = memory._replace(bound=new.bound)
@@ -334,7 +332,7 @@ def _next_step(
     chosen = jax.lax.cond(early, predicted, lambda: step)
     fraction = jnp.where(early, max_fraction, linear_fraction)
     limited_step = limit_closing(chain, point.unknowns, evaluation, chosen, fraction)
-    return choose(predicts, chosen, limited_step), fraction
+    return early, choose(predicts, chosen, limited_step), fraction
 
 
 # Predictor of the tensions along a tendon: the play operator of hysteresis.

@@ -43,7 +43,7 @@ class RodConfiguration(NamedTuple):
     step: Float[Array, "gauss d"]  # The rotated steps at the nodes
     stepped: Float[Array, "gauss d modes"]  # The rotated steps per unit of mode
     # Rotation vectors from place to place, their slopes by the modes, and the change of rotation by
-    # these, along the axes of the start; None in the plane, where rotations commute
+    # a change of these, along the axes of the start; None in the plane, where rotations commute
     from_place: tuple[Array, Array, Array] | None
 
     @property
@@ -61,8 +61,8 @@ def integrate_rod(rod: Rod, modes: Modes) -> RodConfiguration:
     else:
         turns, slope = _turns(rod, hat)
         rotation = xp.stack(list(accumulate(rotation_about(turns), operator.matmul)))
-        turning = rotations_before(rotation) @ left_slope(turns) @ slope
-        from_place, turn = (turns, slope, turning), xp.cumsum(turning, axis=0)
+        by_turns = rotations_before(rotation) @ left_slope(turns)
+        from_place, turn = (turns, slope, by_turns), xp.cumsum(by_turns @ slope, axis=0)
     stepped = (rotation[:-1, ..., None] * rod.step[:, None]).sum(axis=-2)
     return RodConfiguration(rotation, turn, stepped @ hat, stepped[..., 1:], from_place)
 
@@ -226,7 +226,7 @@ def _geometric_in_space(
     # rotation times `beyond`, the moment of the wrench about it.
     assert rod.turn_pair is not None
     assert state.from_place is not None
-    turns, slope, turning = state.from_place
+    turns, slope, by_turns = state.from_place
     end = state.rotation[-1]
     moment, force = end @ end_wrench[:3], end @ end_wrench[3:]
     crossed = jax.vmap(cross, in_axes=(0, None))
@@ -237,14 +237,12 @@ def _geometric_in_space(
     moved_beyond = jnp.cumsum(moved[::-1], axis=0)[::-1]
     change = jax.vmap(cross)(left[:-1], beyond[..., None])
     change = change + jnp.pad(crossed(moved_beyond, force[:, None]), ((0, 1), (0, 0), (0, 0)))
-    before = rotations_before(state.rotation)
-    inside = jnp.einsum("kdc,kd->kc", before, beyond)
-    by_turns = left_slope(turns)
     # The slopes of the rotations change with the modes too: by the slope of the exponential, and by
     # the pairs of the Magnus series.
-    change = jnp.einsum("kdc,kdj->kcj", before @ by_turns, change)
+    change = jnp.einsum("kdc,kdj->kcj", by_turns, change)
+    inside = jnp.einsum("kdc,kd->kc", rotations_before(state.rotation), beyond)
     change = change + jax.vmap(left_slope_change)(turns, inside) @ slope
-    answers = jnp.einsum("kdc,kd->kc", by_turns, inside)
+    answers = jnp.einsum("kdc,kd->kc", by_turns, beyond)
     pairs = jnp.einsum("kcij,kc->ij", rod.turn_pair[..., 1:, 1:], answers)
     by_step = crossed(left[1:-1], force[:, None])
     by_step = jnp.einsum("gci,gcj->ij", state.stepped, by_step)
