@@ -152,11 +152,12 @@ def flexure_states(
     return jax.vmap(state, (0, chain.law.axis, 0, 0))(chain.rods, chain.law, memory, modes)
 
 
-def structural(chain: Chain) -> Chain:
-    """Mark the numbers of a chain that may be constants of a program."""
+def structural(chain: Chain, still: Sequence[int]) -> Chain:
+    """Mark the numbers of a chain that may be constants; its modes `still` turn no place."""
     # They are the strains, rotations and displacements of a rod by its modes, the stiffness between
     # modes, counts and flags. The mask of padding flexures is not: chains of other lengths share
-    # the program.
+    # the program. A mode that turns nothing (stretch, shear) has no pairs with a precurvature
+    # either; those of others may be 0 in a straight rod, and yet have slopes.
 
     marks: Any = jax.tree.map(
         lambda leaf: np.full(np.shape(leaf), xp.asarray(leaf).dtype.kind != "f"), chain
@@ -164,7 +165,9 @@ def structural(chain: Chain) -> Chain:
     rods, everything, of_modes = marks.rods, np.s_[...], np.s_[..., 1:]
     marked = [(rods.basis, everything), (rods.node_reach, everything), (marks.elastic, everything)]
     marked += [(leaf, of_modes) for leaf in (rods.turn, rods.step, rods.node_turn)]
-    for leaf, place in [*marked, (rods.turn_pair, np.s_[..., 1:, 1:])]:
+    without = [1 + mode for mode in still]
+    pairs = np.s_[..., 1:, 1:], np.s_[..., without, 0], np.s_[..., 0, without]
+    for leaf, place in [*marked, *((rods.turn_pair, place) for place in pairs)]:
         if leaf is not None:
             leaf[place] = True
     return marks

@@ -97,9 +97,13 @@ class _Attempt(NamedTuple):
         larger = self._replace(regularisation=compliance / root, factor=root)
         retries = (compliance > 0.0) & (root > 0.0) & (root < _MAX_FACTOR)
         relaxed = self._replace(regularisation=smaller, factor=factor)
+        # Where contacts were not found directly, those of the next substep would not be either.
+        further = self._replace(
+            fraction=2.0 * self.fraction, regularisation=_COMPLIANCE, factor=jnp.zeros(())
+        )
         return choose(
             converged,
-            choose(compliance > 0.0, relaxed, self._longer()),
+            choose(compliance > 0.0, relaxed, further),
             choose(retries, larger, self._shorter(can_snap)),
         )
 

@@ -43,7 +43,7 @@ class RodConfiguration(NamedTuple):
     step: Float[Array, "gauss d"]  # The rotated steps at the nodes
     stepped: Float[Array, "gauss d modes"]  # The rotated steps per unit of mode
     # Rotation vectors from place to place, their slopes by the modes, and the change of rotation by
-    # these, along the axes of the start; None in the plane, where rotations commute
+    # a change of these, along the axes of the start; None in the plane, where rotations commute
     from_place: tuple[Array, Array, Array] | None
 
     @property
@@ -61,8 +61,8 @@ def integrate_rod(rod: Rod, modes: Modes) -> RodConfiguration:
     else:
         turns, slope = _turns(rod, hat)
         rotation = xp.stack(list(accumulate(rotation_about(turns), operator.matmul)))
-        turning = rotations_before(rotation) @ left_slope(turns) @ slope
-        from_place, turn = (turns, slope, turning), xp.cumsum(turning, axis=0)
+        by_turns = rotations_before(rotation) @ left_slope(turns)
+        from_place, turn = (turns, slope, by_turns), xp.cumsum(by_turns @ slope, axis=0)
     stepped = (rotation[:-1, ..., None] * rod.step[:, None]).sum(axis=-2)
     return RodConfiguration(rotation, turn, stepped @ hat, stepped[..., 1:], from_place)
 
@@ -191,67 +191,62 @@ def geometric_stiffness(
     # the start, the generalised force is M . turn + F . (sum of the moved steps).
     axes = state.turn.shape[1]
     end_wrench = tail_pose(rod).wrench(wrench)
-    end = state.rotation[-1]
-    force = end @ end_wrench[axes:]
-    arms = _arms(rod, state, force)
-    turn = state.turn[:-1]
-    # Second-order effect of two rotations on a step along the force, symmetrised.
-    along = 0.5 * (state.step @ force)
-    mixed = jnp.einsum("gci,gcj->ij", arms - along[:, None, None] * turn, turn)
-    leaving = _moments(end_displacement(state)[None], force)[0].T @ state.turn[-1]
-    change = mixed + mixed.T - leaving
     if axes == 3:
-        change = change + _noncommuting_terms(rod, state, end_wrench)
+        change = _geometric_in_space(rod, state, end_wrench)
+    else:
+        change = _geometric_in_plane(rod, state, state.rotation[-1] @ end_wrench[axes:])
     if rod.linear_kinematics is not None:
         small = jax.jacfwd(lambda varied: small_twist(rod, varied).T @ end_wrench)(modes)
         change = jnp.where(rod.linear_kinematics > 0.0, small, change)
     return change
 
 
-def _arms(rod: Rod, state: RodConfiguration, force: Array) -> Float[Array, "gauss a modes"]:
-    """Compute the moments of the force through each step, per unit of mode, about the start."""
-    if len(force) == 3:
-        return _moments(state.stepped, force)
+def _geometric_in_plane(
+    rod: Rod, state: RodConfiguration, force: Float[Array, " 2"]
+) -> Float[Array, "modes modes"]:
+    """Compute `geometric_stiffness` in the plane, where the moment has no part in it."""
     # The result is a scalar: rotating the force is cheaper than the steps of all modes.
     across = jnp.stack([-force[1], force[0]])
     across = jnp.einsum("gdc,d->gc", state.rotation[:-1], across)
-    return jnp.einsum("gc,gci->gi", across, rod.step[..., 1:])[:, None]
+    arms = jnp.einsum("gc,gci->gi", across, rod.step[..., 1:])
+    turn = state.turn[:-1, 0]
+    # Second-order effect of two rotations on a step along the force, symmetrised.
+    along = 0.5 * (state.step @ force)
+    mixed = jnp.einsum("gi,gj->ij", arms - along[:, None] * turn, turn)
+    leaving = moment_of(end_displacement(state), force[:, None]).T @ state.turn[-1]
+    return mixed + mixed.T - leaving
 
 
-def _moments(points: Array, force: Array) -> Float[Array, "places a modes"]:
-    """Compute the moments of one force at points (places, d, modes) about the start."""
-    return jax.vmap(moment_of, in_axes=(0, None))(points, force[:, None])
-
-
-def _noncommuting_terms(
+def _geometric_in_space(
     rod: Rod, state: RodConfiguration, end_wrench: Float[Array, " 6"]
 ) -> Float[Array, "modes modes"]:
-    """Compute the terms of `geometric_stiffness` in space, where rotations do not commute."""
-    # The slopes of the rotations change with the modes: with the rotations before, with the slope
-    # of the exponential, and with the pairs of the Magnus series.
+    """Compute `geometric_stiffness` in space, where rotations do not commute."""
+    # All is seen from the end, with which the wrench moves: to it a mode turns a place back by
+    # `left`, and moves it by `moved`. A place rotates all beyond it: its generalised force is its
+    # rotation times `beyond`, the moment of the wrench about it.
     assert rod.turn_pair is not None
     assert state.from_place is not None
-    turns, slope, turning = state.from_place
+    turns, slope, by_turns = state.from_place
     end = state.rotation[-1]
     moment, force = end @ end_wrench[:3], end @ end_wrench[3:]
-    nodes = state.turn[:-1]
-    # Contribution of each point to the wrench, then of all points from it on.
-    shares = jax.vmap(cross, in_axes=(0, None))(state.step, force)
-    shares = jnp.concatenate([shares, moment[None]])
+    crossed = jax.vmap(cross, in_axes=(0, None))
+    left = state.turn[-1:] - jnp.concatenate([jnp.zeros_like(state.turn[:1]), state.turn])
+    moved = state.stepped - jax.vmap(cross)(left[1:-1], state.step[..., None])
+    shares = jnp.concatenate([crossed(state.step, force), moment[None]])
     beyond = jnp.cumsum(shares[::-1], axis=0)[::-1]
-    turned_before = jnp.concatenate([jnp.zeros_like(state.turn[:1]), state.turn[:-1]])
-    lever = jax.vmap(cross)(turning, beyond[..., None])
-    change = jnp.einsum("kci,kcj->ij", lever, turned_before)
+    moved_beyond = jnp.cumsum(moved[::-1], axis=0)[::-1]
+    change = jax.vmap(cross)(left[:-1], beyond[..., None])
+    change = change + jnp.pad(crossed(moved_beyond, force[:, None]), ((0, 1), (0, 0), (0, 0)))
+    # The slopes of the rotations change with the modes too: by the slope of the exponential, and by
+    # the pairs of the Magnus series.
+    change = jnp.einsum("kdc,kdj->kcj", by_turns, change)
     inside = jnp.einsum("kdc,kd->kc", rotations_before(state.rotation), beyond)
-    bending = jax.vmap(left_slope_change)(turns, inside)
-    change = change + jnp.einsum("kci,kcd,kdj->ij", slope, bending, slope)
-    answers = jnp.einsum("kdc,kd->kc", left_slope(turns), inside)
-    change = change + 2.0 * jnp.einsum("kcij,kc->ij", rod.turn_pair[..., 1:, 1:], answers)
-    # The end rotates the first node's wrench, and steps leave the plane of their rotations.
-    last = state.turn[-1]
-    change = change + jnp.einsum("ci,cj->ij", last, cross(last, moment[:, None]))
-    by_force = jnp.einsum("gcj,c->gj", nodes, force)
-    return change + jnp.einsum("gci,gc,gj->ij", nodes, state.step, by_force)
+    change = change + jax.vmap(left_slope_change)(turns, inside) @ slope
+    answers = jnp.einsum("kdc,kd->kc", by_turns, beyond)
+    pairs = jnp.einsum("kcij,kc->ij", rod.turn_pair[..., 1:, 1:], answers)
+    by_step = crossed(left[1:-1], force[:, None])
+    by_step = jnp.einsum("gci,gcj->ij", state.stepped, by_step)
+    return jnp.einsum("kci,kcj->ij", slope, change) + 2.0 * pairs + by_step
 
 
 class FlexureState(Pytree):

@@ -49,7 +49,7 @@ class PreparedChain:
     @cached_property
     def static_structure(self) -> StaticStructure:
         """Numbers of the chain that are compiled in, and the layout of the others."""
-        return StaticStructure.of(self.chain_layout, self.chain.flexures, self.vector)
+        return StaticStructure.of(self.chain_layout, self.chain, self.vector)
 
     @cached_property
     def dynamic_vector(self) -> Float[np.ndarray, " dynamic"]:

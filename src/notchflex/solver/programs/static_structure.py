@@ -23,7 +23,7 @@ from jaxtyping import Array, Bool, Float, Int
 from lanewise import WIDTH
 from notchflex._arrays import xp
 from notchflex._jax import jax
-from notchflex.mechanics.chain import structural
+from notchflex.mechanics.chain import Chain, structural
 
 
 class PytreeLayout:
@@ -140,10 +140,14 @@ class StaticStructure:
 
     @classmethod
     def of(
-        cls, form: PytreeLayout, flexures: int, numbers: Float[np.ndarray, " chain"]
+        cls, form: PytreeLayout, chain: Chain, numbers: Float[np.ndarray, " chain"]
     ) -> StaticStructure:
         """Return the structure of a chain; chains with equal structures share one object."""
-        may_be_constant, floats, first = _comparisons(form, flexures)
+        flexures, still = chain.flexures, list[int]()
+        if chain.rods.turn_pair is not None:
+            turns = np.any(chain.rods.turn[..., 1:], axis=(0, 1, 2))
+            still = np.flatnonzero(~turns).tolist()
+        may_be_constant, floats, first = _comparisons(form, flexures, tuple(still))
         numbers = without_rounding(form, numbers)
         equal = (numbers == numbers[first]) & (~floats | (numbers == 0.0))
         constant = may_be_constant & _all(equal, first)
@@ -211,14 +215,17 @@ def without_rounding(
 
 
 @lru_cache(maxsize=64)
-def _comparisons(form: PytreeLayout, flexures: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _comparisons(
+    form: PytreeLayout, flexures: int, still: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return which numbers may be constants, which are floats, and the first of each column."""
     first = np.arange(form.size)
     for indices in form.indices:
         rows = _by_flexure(indices, flexures)
         first[rows] = rows[:1]
     floats = np.repeat([kind == "f" for kind in form.kinds], np.diff(form.ends))
-    return form.pack(structural(form.unpack(first.astype(float)))) > 0.0, floats, first
+    may_be_constant = form.pack(structural(form.unpack(first.astype(float)), still)) > 0.0
+    return may_be_constant, floats, first
 
 
 def _all(values: Bool[np.ndarray, " n"], group: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
