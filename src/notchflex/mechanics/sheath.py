@@ -101,11 +101,24 @@ def log_tension(tension: Float[Array, " t"]) -> Float[Array, " t"]:
 
 
 def within(memory: SheathMemory, limit: Float[Array, " t"]) -> Corners:
-    """Return the profiles under a friction that may have fallen: the wire then slides."""
-    widths, steps = jnp.diff(memory.place), jnp.diff(memory.level)
-    steps = jnp.clip(steps, -limit[:, None] * widths, limit[:, None] * widths)
-    rises = jnp.cumsum(steps, axis=1)
-    return memory.place, memory.level[:, :1] + jnp.pad(rises, ((0, 0), (1, 0)))
+    """Return the profiles, with a corner in each piece, where less friction lets the wire slide."""
+    # From the drive on the line is the old one, but nowhere steeper than the friction holds: behind
+    # a piece that is too steep it goes on with the slope that holds until it meets the old one.
+    # Nothing beyond moves, so a small change before stays small.
+    places, lines = list(memory.place.T), list(memory.level.T)
+    line, corners = lines[0], [(places[0], lines[0])]
+    for start, end, old, new in zip(places, places[1:], lines, lines[1:], strict=False):
+        width, step, gap = end - start, new - old, old - line
+        apart, side, most = jnp.abs(gap) > _ROUNDING, jnp.sign(gap), limit * width
+        nearer = most - side * step  # by so much the line comes nearer over the piece
+        meets = apart & (nearer > jnp.abs(gap))
+        part = jnp.where(meets, jnp.abs(gap) / jnp.where(meets, nearer, 1.0), 1.0 * apart)
+        line = line + part * side * most
+        corners.append((start + part * width, line))
+        steep = jnp.abs(step) > most + _ROUNDING
+        line = line + (1.0 - part) * jnp.where(steep, jnp.sign(step) * most, step)
+        corners.append((end, line))
+    return jnp.stack([x for x, _ in corners], axis=1), jnp.stack([y for _, y in corners], axis=1)
 
 
 def from_drive(profile: Corners, end: Float[Array, " t"], limit: Float[Array, " t"]) -> Corners:
@@ -157,13 +170,17 @@ def _relative_mean(half: Array) -> Array:
 
 def kept(profile: Corners) -> Corners:
     """Return the profiles by as many corners as a memory has, without those that change least."""
-    while profile[0].shape[1] > _CORNERS:
-        place, level = profile
-        before, after = jnp.diff(place), jnp.diff(level)
+    count = profile[0].shape[1]
+
+    def drop(dropped: Array, profile: Corners) -> Corners:
+        before, after = (jnp.diff(line) for line in profile)
         area = jnp.abs(before[:, :-1] * after[:, 1:] - before[:, 1:] * after[:, :-1])
-        area = jnp.where(area < _ROUNDING, 0.0, area)
-        dropped = 1 + jnp.argmin(area, axis=1, keepdims=True)
-        stays = jnp.arange(place.shape[1] - 1)[None] < dropped
-        place, level = (jnp.where(stays, line[:, :-1], line[:, 1:]) for line in profile)
-        profile = place, level
-    return profile
+        # Behind the corners that are left stand copies of the last one.
+        is_left = jnp.arange(count - 2) < count - 2 - dropped
+        area = jnp.where(is_left[None], jnp.where(area < _ROUNDING, 0.0, area), jnp.inf)
+        stays = jnp.arange(count)[None] <= jnp.argmin(area, axis=1, keepdims=True)
+        place, level = (jnp.where(stays, x, jnp.append(x[:, 1:], x[:, -1:], 1)) for x in profile)
+        return place, level
+
+    place, level = jax.lax.fori_loop(0, count - _CORNERS, drop, profile)
+    return place[:, :_CORNERS], level[:, :_CORNERS]
