@@ -279,6 +279,21 @@ def test_a_sheath_that_is_bent_more_or_less(margin):
     margin.within("compressed sheath", elastic(short) - LENGTH * stiff, FIGURE, "mm")
 
 
+def test_a_small_way_before_less_bend_stays_small():
+    """The front of a way u is as long as its root; a shift of the whole line would be one more."""
+    robot = sheathed(sheath_length=140.0, sheath_wire_stiffness=1420.0, sheath_friction=0.14)
+    ways = np.array([0.0, 1e-9, 1e-7])
+    ends = []
+    for way in ways:
+        turns = (0.6, 10.0), (0.6, 460.0), (0.6 + way, 460.0), (0.6 + way, 180.0), (0.6 + way, 20.0)
+        loads = [nf.Load(stroke=stroke, sheath_bend_deg=bend) for stroke, bend in turns]
+        path = follow(robot, loads)
+        ends.append((path.tension[-1, 0], path.base_tension[-1, 0]))
+    drive, base = np.abs(np.array(ends) - ends[0]).T
+    assert (base < 1e-9).all()
+    assert (drive <= np.sqrt(ways)).all()
+
+
 def test_states_and_batches_know_the_sheath(tmp_path, margin):
     robot, drive = sheathed(backlash=0.02), [1.2, 0.6, 0.9, 0.7, 1.0, 0.2]
     path = follow(robot, tensions(drive))
