@@ -179,7 +179,7 @@ def test_names_of_own_parts():
     assert "[notch.tube]  # a sleeve" in rewritten
     assert "inner_diameter = 1.52  # guessed (changed from 1.5)" in rewritten
     for name, words in (
-        ("notch[1].material.elastic_modulus", "Allowed: kind"),
+        ("notch[1].material.elastic_modulus", "no notch that is meant has a material of its own"),
         ("notch[2].material.elastic_modlus", "did you mean `elastic_modulus`"),
         ("notch[2].material.kind", 'allowed: "linear"'),
     ):

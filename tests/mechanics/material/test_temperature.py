@@ -105,7 +105,7 @@ def test_a_tensile_test_returns_what_the_data_sheet_says(keys):
 
 @pytest.mark.parametrize("stresses", [(900.0, 100.0), (100.0, None), (500.0, 100.0)])
 def test_impossible_data_sheets(stresses):
-    with pytest.raises(nf.InputError, match="lies on no plateau"):
+    with pytest.raises(nf.InputError, match="no material has an upper_plateau"):
         nf.TensileTest(*stresses).nitinol(elastic_modulus=20_000.0, plateau_modulus=6_000.0)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fake_path import fake_path
+from notchflex import load_robot
 from notchflex.loads.load import NOTHING, BodyForce, ExternalLoad
 from notchflex.results.tables import json_text, path_document, write_json
 
@@ -93,9 +94,13 @@ def test_angles_of_contacts_and_the_front():
 
 
 def test_chord_angles_are_told_where_there_are_any():
-    path = fake_path(2)
-    assert "chord_angle_deg" not in path_document(path)["steps"][0]
-    path.columns["chord_angle"][:, 1] = 0.5
+    assert "chord_angle_deg" not in path_document(fake_path(2))["steps"][0]
+    strip, arc = load_robot("liu2022"), load_robot("pacheco2021-a").notch[0]
+    count = strip.number_of_notches
+    path = fake_path(2, robot=strip.replace(notch=(*strip.notch, arc)))
+    path.columns["chord_angle"][:, :count] = 0.5
     step = json.loads(json_text(path_document(path)))["steps"][0]
-    assert step["chord_angle_deg"] == [None, pytest.approx(np.degrees(0.5)), None, None, None]
+    angles = step["chord_angle_deg"]
+    assert angles[:count] == pytest.approx([np.degrees(0.5)] * count)
+    assert not any(angles[count:])
     assert "total_chord_angle_deg" not in step
