@@ -292,20 +292,23 @@ def _of_plane(frame: Float[Array, "3 3"]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _check(external: ExternalLoad, robot: Robot) -> None:
-    last, material = robot.number_of_notches, robot.material
+    last = robot.number_of_notches
     if external.temperature is not None:
-        if len(set(robot.materials)) > 1:
+        laws = {notch.made_of(robot.material) for notch in robot.notches}
+        warm = [material for material in laws if isinstance(material, Transforming)]
+        if len(warm) > 1:
             raise InputError.UNSUPPORTED(
-                f"a load cannot give {robot.name} a temperature, as it has several materials; give "
-                "each its own in the robot file (material.temperature, notch.material.temperature)"
+                f"a load cannot give {robot.name} a temperature, as several of its materials have "
+                "one; give each its own in the robot file (material.temperature, "
+                "notch.material.temperature)"
             )
-        if not isinstance(material, Transforming) or material.reference_temperature is None:
+        if not warm or warm[0].reference_temperature is None:
             raise InputError.UNSUPPORTED(
                 f"temperature has no effect on {robot.name}: it is not known at which temperature "
                 "its material was measured; give material.reference_temperature (deg C), which "
                 "nitinol and superelastic have"
             )
-        replace(cast("Any", material), temperature=external.temperature)  # raises if it is too cold
+        replace(cast("Any", warm[0]), temperature=external.temperature)  # raises if too cold
     for force in external.body_forces:
         if force.body > last:
             raise InputError.OUT_OF_RANGE(

@@ -128,9 +128,16 @@ def test_a_load_moves_the_plateaus_as_by_hand():
     assert len(loaded.prepared.long.programs) == 1
 
 
-def test_a_load_warms_notches_beside_a_table():
+@pytest.mark.parametrize(
+    "joint",
+    [
+        nf.TableNotch(2.0, angle_deg=(5.0, 20.0), moment=(1.0, 3.0), uncut_length=1.0),
+        replace(MEASURED.notch[0], repeat=1, material=nf.Linear(200e3, density=7900.0)),
+    ],
+    ids=["table", "steel"],
+)
+def test_a_load_warms_nitinol_beside_other_parts(joint):
     """As the robot does at that temperature, alone and among others with other numbers."""
-    joint = nf.TableNotch(2.0, angle_deg=(5.0, 20.0), moment=(1.0, 3.0), uncut_length=1.0)
     robot = MEASURED.replace(notch=(joint, *MEASURED.notch))
     warm = nf.Load(tension=1.0, temperature=37.0)
     there = nf.solve(robot.with_value("material.temperature", 37.0), nf.Load(tension=1.0))
@@ -141,6 +148,15 @@ def test_a_load_warms_notches_beside_a_table():
     rows = nf.solve_batch([robot, other], warm, outputs=("notch_angle",))["notch_angle"]
     assert np.abs(rows[0] - there.notch_angle).max() < 1e-9
     assert np.abs(rows[1] - nf.solve(other, warm).notch_angle).max() < 1e-9
+
+
+def test_a_load_warms_one_nitinol_only():
+    other = replace(MEASURED.material, plateau_stress=300.0)
+    robot = MEASURED.replace(
+        notch=(replace(MEASURED.notch[0], repeat=1, material=other), *MEASURED.notch)
+    )
+    with pytest.raises(nf.InputError, match="several of its materials have one"):
+        nf.solve(robot, nf.Load(tension=1.0, temperature=37.0))
 
 
 def test_batches_states_files_and_slopes_know_the_temperature(tmp_path):

@@ -50,12 +50,17 @@ def _(notch: RodGap, tube: Tube, refinement: int = 0, site: Site | None = None) 
     basis = StrainModes(modes / length, (in_plane, in_plane, modes.shape[-1]))
     free = STRAIGHT + xp.radians(notch.precurvature_deg) * basis.basis[..., 0]
     axis = NeutralAxis(points, shifted(), shifted(), strain=free)
-    return build_rod(axis, tubular_section(notch), basis, direction_deg=notch.direction_deg)
+    return build_rod(
+        axis,
+        ring_section(notch.diameter, notch.inner_diameter),
+        basis,
+        direction_deg=notch.direction_deg,
+    )
 
 
-def tubular_section(notch: RodGap) -> FibreSection:
-    """Return the section of a round or tubular backbone."""
-    outer, inner = 0.5 * notch.diameter, 0.5 * notch.inner_diameter
+def ring_section(outer_diameter: Any, inner_diameter: Any) -> FibreSection:
+    """Return the section of a round rod, or of a tube."""
+    outer, inner = 0.5 * outer_diameter, 0.5 * inner_diameter
     second = 0.25 * np.pi * (outer**4 - inner**4)
     return FibreSection(
         area=constant(np.pi * (outer**2 - inner**2)),

@@ -11,6 +11,7 @@ that a solve passes there, and such states are refused.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -28,6 +29,7 @@ from notchflex.mechanics.flexure.notch_rod import (
     shifted,
 )
 from notchflex.mechanics.flexure.rod import Rod, Site, rod, section_fibres
+from notchflex.mechanics.flexure.rod_gap import ring_section
 from notchflex.mechanics.material import FibreSection, Flattening, Law, SectionResponse, section_law
 from notchflex.mechanics.material.law import Bending, Strain
 from notchflex.mechanics.section import FibresAt, two_walls_fibres
@@ -152,22 +154,15 @@ def _(notch: TableNotch, tube: Tube, refinement: int = 0, site: Site | None = No
     strain = STRAIGHT + xp.radians(notch.precurvature_deg) * basis[..., 0]
     offset, radius = notch.axis_offset, tube.outer_radius
     closing = notch.closing_angle_deg
-    area = np.pi * (radius**2 - tube.inner_radius**2)
-    second = 0.25 * area * (radius**2 + tube.inner_radius**2)
+    section = replace(
+        ring_section(tube.outer_diameter, tube.inner_diameter),
+        torsion_constant=constant(1.0),
+        edge_spine=constant(radius - offset),
+        edge_near=constant(radius + offset),
+    )
     return build_rod(
         NeutralAxis(points, shifted(-offset), shifted(offset), strain=strain),
-        FibreSection(
-            area=constant(area),
-            second_moment_weak=constant(second),
-            second_moment_strong=constant(second),
-            torsion_constant=constant(1.0),
-            shear_centre=constant(0.0),
-            edge_spine=constant(radius - offset),
-            edge_near=constant(radius + offset),
-            outer_radius=constant(radius),
-            half_angle=constant(np.pi),
-            edge_across=constant(0.0),
-        ),
+        section,
         StrainModes(constant(basis), (few, few, len(free))),
         None if closing is None else notch.length / xp.radians(closing),
         direction_deg=notch.direction_deg,

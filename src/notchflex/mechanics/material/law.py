@@ -611,12 +611,10 @@ def moduli(material: Any) -> tuple[Array, Array]:
 def temperature_of(material: Any, *sides: Any) -> dict[str, Array]:
     """Return temperature and moves of a law whose strains move by shares (`sides`) of a stress."""
     # Clausius and Clapeyron: the stress of a transformation changes in proportion to temperature.
-    reference, given = material.reference_temperature, material.temperature
-    if reference is None:
+    if material.reference_temperature is None:
         return {}
     moves = material.stress_per_kelvin / material.elastic_modulus * xp.stack(sides)
-    temperature = reference if given is None else given
-    return {"temperature": constant(temperature), "moves": constant(moves)}
+    return {"temperature": constant(material.used_at), "moves": constant(moves)}
 
 
 @singledispatch
