@@ -417,6 +417,8 @@ class ExternalLoads:
                 BodyForce(body, force, point=point or (0.0, 0.0, 0.0), following=self.following)
                 for body, force, point in forces
             ]
+        if self.temperature and len(self.temperature) == 1:
+            (given["temperature"],) = self.temperature
         given["following"] = self.following and bool(self.tip_force or self.tip_moment)
         return given
 

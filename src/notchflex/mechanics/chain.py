@@ -407,7 +407,8 @@ def limit_line(fatigue: Fatigue, robot: Robot) -> LimitLine | None:
     facts, notches, radius = fatigue.facts, robot.notches, fatigue.corner_radius
     if not facts:
         return None
-    factors = xp.full(len(notches), fatigue.corner_factor or 1.0)
+    given = fatigue.corner_factor
+    factors = xp.full(len(notches), 1.0 if given is None else given)
     if radius is not None:
         lengths = body_lengths(robot.tube, notches)
         factors = corner_factors(radius, notches, robot.tubes[1:], lengths)

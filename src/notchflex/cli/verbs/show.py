@@ -110,7 +110,8 @@ def _at_temperatures(robot: Robot) -> Iterator[dict[str, Any]]:
             if _warms(material):
                 of = {"notches": ", ".join(str(k + 1) for k in members)} if len(alike) > 1 else {}
                 row = zip(("plateau_MPa", "lower_plateau_MPa"), material.plateaus, strict=False)
-                ends = [function(tension[k] for k in members) for function in (min, max)]
+                closes = [tension[k] for k in members if not math.isnan(tension[k])]
+                ends = [function(closes, default=math.nan) for function in (min, max)]
                 yield {"temperature_C": temperature, **of, **dict(row), "closing_tension_N": ends}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -141,8 +141,11 @@ def simulate(
 
         start = None if from_state is None else _start(from_state)
         turn = np.radians(base_rotation or (0.0, 0.0, 0.0))
-        load = analysis.spool_path(chosen, tensions) if spool else LoadPath(tensions, strokes)
-        load = replace(load, base_rotation=turn).loaded(**external.arguments())
+        others = external.arguments()
+        if spool:
+            load = analysis.spool_path(chosen, tensions, base_rotation=turn, **others)
+        else:
+            load = LoadPath(tensions, strokes, base_rotation=turn).loaded(**others)
         if uncertain:
             more: dict[str, Any] = {} if draws is None else {"draws": draws}
             bands = analysis.uncertain(

@@ -116,11 +116,11 @@ def workspace(
         raise InputError.CONFLICT("--folder takes one robot; leave --beside out.")
     folder = pieces.chosen("workspace", inputs)
     with terminal.progress("exploring") as progress:
-        from notchflex import pull
+        from notchflex import Load
         from notchflex import workspaces as exploring
         from notchflex.workspaces import in_python
 
-        load = pull(0.0, 0.0, steps=1).loaded(**external.arguments())[0]
+        load = Load(tension=0.0, **external.arguments())
         limits = in_python(dict(limit))
         explored = {
             label: exploring.workspace(
