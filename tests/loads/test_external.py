@@ -36,7 +36,7 @@ def sums(load, *, robot=ROBOT, mass=None, centre=None) -> BodyLoads:
         body_length=LENGTH,
         frame=None,
         loaded=True,
-        law=SimpleNamespace(temperature=None),
+        law=SimpleNamespace(starts_at=None),
         sheath=None,
     )
     command = make_commands(load_path(load, robot.number_of_tendons), robot, chain)
