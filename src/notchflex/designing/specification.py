@@ -229,6 +229,9 @@ class DesignState:
         tip_force: Force at the tip, N.
         tip_moment: Moment at the tip, N mm.
         tip_mass: Mass that hangs at the tip, g.
+        temperature: Temperature of the robot, deg C; that of its file where not given.
+        sheath_bend_deg: Total angle by which all sheaths are bent, deg; as in the robot's file
+            where not given.
     """
 
     name: Name
@@ -239,6 +242,8 @@ class DesignState:
     tip_force: Vector = _NONE
     tip_moment: Vector = _NONE
     tip_mass: Annotated[Float, Field(ge=0.0, le=1e6)] = 0.0
+    temperature: Float | None = None
+    sheath_bend_deg: Annotated[Float | None, Field(ge=0.0, le=3600.0)] = None
 
 
 def _by_name(given: Any) -> Any:

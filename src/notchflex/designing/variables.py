@@ -294,8 +294,9 @@ class LoadSteps:
 
 def _external(load: DesignState, more: float | np.ndarray = 0.0) -> ExternalLoad:
     """Return the external loads of a load, with more force at the tip."""
+    names = "tip_moment", "tip_mass", "temperature", "sheath_bend_deg"
     force = tuple((np.array(load.tip_force) + more).tolist())
-    return ExternalLoad(tip_force=force, tip_moment=load.tip_moment, tip_mass=load.tip_mass)
+    return ExternalLoad(tip_force=force, **{name: getattr(load, name) for name in names})
 
 
 def load_steps(
