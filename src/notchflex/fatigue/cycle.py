@@ -114,6 +114,17 @@ class StrainCycle(Displayed):
                 'cuts "on-axis" 0.68 to 0.92 outer diameters deep, rings from 0.2 and radii from '
                 "0.006 to 0.1; give fatigue.corner_factor (K_t) instead."
             )
+        others = [
+            str(number)
+            for number, (notch, mean) in enumerate(zip(notches, self.mean, strict=True), start=1)
+            if not hasattr(notch.made_of(self.robot.material), "plateaus")
+            and not np.isnan(mean).all()
+        ]
+        if self.limit.line and others:
+            warnings.append(
+                f"{self.limit.line} was measured on superelastic nitinol; the material of notch "
+                f"{', '.join(others)} is another one."
+            )
         at, used = facts.get("temperature"), " and ".join(f"{one:g}" for one in self.temperatures)
         if at is not None and {*self.temperatures} - {at}:
             warnings.append(f"the robot is at {used} deg C, and the limit line is for {at:g}.")
