@@ -34,6 +34,17 @@ def test_a_spool_draws_one_and_releases_the_other(margin):
     margin.within("strokes", path.stroke - path.stroke[0] - moved, 1e-12, "mm")
 
 
+def test_a_spool_stands_at_zero_under_the_loads_that_act():
+    robot, turn = antagonists(), np.radians([0.0, 30.0, 0.0])
+    loads = {"tip_force": (0.05, 0.0, 0.0), "sheath_bend_deg": 40.0}
+    load = nf.spool_path(robot, [0.0, 0.01], base_rotation=turn, **loads)
+    assert load.external[2].tip_force == loads["tip_force"]
+    assert load.base_rotation == pytest.approx(turn)
+    path = nf.simulate(robot, load).raise_if_failed()
+    assert path.tension[1] == pytest.approx([0.3, 0.3], abs=1e-9)
+    assert path.stroke[0, 0] > nf.simulate(robot, nf.spool_path(robot, [0.0])).stroke[0, 0] + 1e-3
+
+
 def test_friction_and_sheath_remember_the_turns():
     robot = antagonists(sheath_friction=0.15, sheath_bend_deg=180.0)
     path = nf.simulate(robot, nf.spool_path(robot, [0.0, 0.2, 0.0, -0.2, 0.0])).raise_if_failed()
@@ -51,6 +62,8 @@ def test_robot_files_keep_the_spool():
 
 
 def test_what_is_refused():
+    with refused("NOT_FINITE"):
+        nf.spool_path(antagonists(), [0.0, np.inf])
     robot = antagonists()
     with pytest.raises(nf.InputError, match="has no spool"):
         nf.spool_path(ready("a"), [0.0])

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import notchflex as nf
 from notchflex.cli import run
+from notchflex.cli.options import ExternalLoads
 from notchflex.support import parse_whole, read_command
 from refusals import refused
 
@@ -142,6 +143,13 @@ def test_a_path_that_varies_temperature_or_bend_has_their_columns(tmp_path, caps
     assert table["sheath_bend_deg"].to_list() == [None, pytest.approx(90.0, rel=1e-14)]
     assert "temperature_C" not in table.columns
     assert "sheath_bend_deg" not in nf.simulate(wrist, nf.Load(1.0)).to_dataframe().columns
+
+
+def test_a_search_has_one_temperature(capsys):
+    assert ExternalLoads(temperature=[37.0]).arguments()["temperature"] == 37.0
+    options = ["--states", "60", "--tension", "1", "--temperature", "22,37"]
+    assert run(["workspace", "pacheco2021-a-true", *options]) == 2
+    assert "temperature must be a number of deg C" in capsys.readouterr().err
 
 
 def test_a_bend_without_a_sheath_is_refused(capsys):

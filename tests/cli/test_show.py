@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import notchflex as nf
@@ -123,3 +124,15 @@ def test_flexures_of_a_nitinol_of_their_own_are_warmed_and_named(call, tmp_path)
     tension = nf.closing(wrist.replace(notch=warm, tendon=tendon)).tension
     found = [row["closing_tension_N"] for row in rows[2:]]
     assert found == [pytest.approx([one, one], rel=1e-9) for one in (tension[0], tension[2])]
+
+
+def test_a_backbone_that_never_closes_hides_no_closing_of_notches(call, tmp_path):
+    wrist = nf.load_robot("pacheco2021-a-true").with_value("material.reference_temperature", 37.0)
+    rod = nf.RodGap(2.0, 0.5, uncut_length=1.0)
+    tendon = [replace(wrist.tendon[0], end_body=None, path="straight")]
+    robot = wrist.replace(notch=(rod, *wrist.notch), tendon=tendon)
+    nf.save_robot(robot, tmp_path / "carried.toml")
+    body = json.loads(call("show", "carried.toml", "--json", "-")[1])["temperatures"][1]
+    tension = nf.closing(robot).tension
+    ends = [np.nanmin(tension), np.nanmax(tension)]
+    assert body["closing_tension_N"] == pytest.approx(ends, rel=1e-9)

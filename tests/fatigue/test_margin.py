@@ -16,14 +16,15 @@ def worst_of(robot, tension):
     return nf.solve(robot, nf.Load(tension)).fatigue_margin.min()
 
 
-def test_slopes_are_those_of_differences():
+@pytest.mark.parametrize("robot", [WRIST, WRIST.with_value("fatigue.corner_factor", 1.4)])
+def test_slopes_are_those_of_differences(robot):
     names = ["notch.depth", "material.plateau_stress", "tube.inner_diameter"]
-    state = nf.simulate(WRIST, [nf.Load(0.7)])
+    state = nf.simulate(robot, [nf.Load(0.7)])
     slope = state.jacobian(names, ("fatigue_margin",))["fatigue_margin"][0, :, :]
     for column, name in enumerate(names):
-        value = nf.support.number_at(WRIST, name)
+        value = nf.support.number_at(robot, name)
         moved = [
-            nf.solve(WRIST.with_value(name, value * (1.0 + part)), nf.Load(0.7)).fatigue_margin
+            nf.solve(robot.with_value(name, value * (1.0 + part)), nf.Load(0.7)).fatigue_margin
             for part in (1e-5, -1e-5)
         ]
         differences = (moved[0] - moved[1]) / (2e-5 * value)

@@ -177,6 +177,22 @@ def test_batches_states_files_and_slopes_know_the_temperature(tmp_path):
     assert again.load[7].temperature == 36.0
 
 
+def test_a_load_of_a_design_has_a_temperature(tmp_path):
+    nf.save_robot(MEASURED, tmp_path / "wrist.toml")
+    spec = nf.DesignSpec(
+        name="warm",
+        robot=str(tmp_path / "wrist.toml"),
+        variable=[{"value": "notch.depth", "lower": 1.38, "upper": 1.42}],
+        load={"pulled": {"tension": 1.0, "temperature": 37.0}},
+        objective=[{"quantity": "total_angle", "load": "pulled", "target": 60.0}],
+        search={"starts": 1, "candidates": 2},
+    )
+    state = nf.design(spec).path[-1]
+    warm = nf.simulate(state.robot, nf.pull(0.0, 1.0, steps=6).loaded(temperature=37.0))
+    assert state.load.temperature == 37.0
+    assert state.total_angle == pytest.approx(warm.total_angle[-1], rel=1e-6)
+
+
 def test_slopes_by_the_temperature_of_the_robot():
     def angle(value, load):
         robot = MEASURED.with_value("material.temperature", value)
