@@ -35,8 +35,8 @@ class LoadStepResult(NamedTuple):
         substeps: Number of substeps that converged.
         between: The state before the last substep, the origin of its friction history.
         fraction_before: Fraction of the load step at that state.
-        overdrawn: Inextensible tendons whose strokes no shape allows: in the last attempt their
-            tensions grew and the shape did not change.
+        overdrawn: Inextensible tendons whose strokes no shape allows: in an attempt since the last
+            substep their tensions grew and the shape did not change.
     """
 
     solved: SolverState
@@ -227,7 +227,7 @@ def _result_after(
     if target.by_stroke is not None:
         least = chain.closing_force * jnp.maximum(_OVERDRAWN, new.residual / _BALANCED)
         pulled = (new.point.base_tension > least) & chain.inextensible
-        overdrawn = target.by_stroke & pulled
+        overdrawn = result.overdrawn | (target.by_stroke & pulled)
     success = result._replace(
         solved=state_after(
             chain, target, new.point, memory, new.stroke, result.solved.memory.sheath
@@ -237,12 +237,11 @@ def _result_after(
         substeps=result.substeps + 1,
         between=result.solved,
         fraction_before=result.reached,
+        overdrawn=jnp.zeros(chain.tendons, bool),
     )
     solved = new.converged & (state.attempt.regularisation == 0.0)
-    return choose(solved, success, result)._replace(
-        residual=new.residual,
-        iterations=result.iterations + new.iterations,
-        overdrawn=overdrawn,
+    return choose(solved, success, result._replace(overdrawn=overdrawn))._replace(
+        residual=new.residual, iterations=result.iterations + new.iterations
     )
 
 
