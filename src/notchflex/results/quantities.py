@@ -440,7 +440,7 @@ def holds(path: EquilibriumPath, quantity: Quantity) -> bool:
 def entries_there(path: EquilibriumPath, quantity: Quantity) -> np.ndarray:
     """Return which entries of a step a path has; no load gives the others a number."""
     spans = np.asarray(path.chain.contacts) >= 0
-    ends = {("span",): spans, ("contact",): spans[:, 1:]}
+    ends: dict[tuple[str, ...], Any] = {("span",): spans, ("contact",): spans[:, 1:]}
     whole = True if quantity.optional is None else quantity.optional(path)
     there = ends.get(quantity.per[1:], whole)
     return np.broadcast_to(there, np.shape(path.quantity(quantity.name))[1:])
