@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -44,7 +44,7 @@ from notchflex.cli.terminal import DONE
 from notchflex.support import BROWSER, MOVING, PAPER, TendonCommand, Vector, load_columns
 
 if TYPE_CHECKING:
-    from notchflex import Bands, EquilibriumPath, State, StrainCycle
+    from notchflex import Bands, EquilibriumPath, LoadPath, Robot, State, StrainCycle
 
 
 @Parameter(name="*", group=OUTPUT)
@@ -135,17 +135,10 @@ def simulate(
     text = f"solving {len(tensions)} steps of {chosen.name}"
     bands, paths = None, {}
     with terminal.progress(text) as progress:
-        import numpy as np
-
-        from notchflex import LoadPath, analysis
+        from notchflex import analysis
 
         start = None if from_state is None else _start(from_state)
-        turn = np.radians(base_rotation or (0.0, 0.0, 0.0))
-        others = external.arguments()
-        if spool:
-            load = analysis.spool_path(chosen, tensions, base_rotation=turn, **others)
-        else:
-            load = LoadPath(tensions, strokes, base_rotation=turn).loaded(**others)
+        load = _load((tensions, strokes), external, base_rotation, chosen if spool else None)
         if uncertain:
             more: dict[str, Any] = {} if draws is None else {"draws": draws}
             bands = analysis.uncertain(
@@ -167,6 +160,23 @@ def simulate(
         if len(paths) > 1:
             path_table.print_beside(paths, columns=shown, every_row=every_row)
     return max(_report(path, f"{label}: " if beside else "") for label, path in paths.items())
+
+
+def _load(
+    columns: tuple[Any, Any],
+    external: ExternalLoads,
+    base_rotation: Sequence[float] | None = None,
+    by_spool: Robot | None = None,
+) -> LoadPath:
+    """Return a path of tensions and strokes, or of ways of the spools of a robot."""
+    import numpy as np
+
+    from notchflex import LoadPath, analysis
+
+    others, turn = external.arguments(), np.radians(base_rotation or (0.0, 0.0, 0.0))
+    if by_spool is not None:
+        return analysis.spool_path(by_spool, columns[0], base_rotation=turn, **others)
+    return LoadPath(*columns, base_rotation=turn).loaded(**others)
 
 
 def _start(file: str) -> State:
@@ -263,10 +273,10 @@ def fatigue(
     chosen = chosen_robot(robot, settings)
     columns = load_columns(tension, stroke, chosen.number_of_tendons)
     with terminal.progress(f"solving loops of {chosen.name}"):
-        from notchflex import LoadPath, simulate
+        from notchflex import simulate
         from notchflex.fatigue import cycle_columns, cycle_document, line_words, strain_cycle
 
-        load = LoadPath(*columns).loaded(**external.arguments())
+        load = _load(columns, external)
         cycle = strain_cycle(simulate(chosen, load, refinement=refinement))
 
     def show(cycle: StrainCycle) -> None:
