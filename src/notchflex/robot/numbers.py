@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
 import operator
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from notchflex.robot.part import unchecked
+from notchflex.robot.part import own_parts, unchecked
 from notchflex.robot.robot import Robot
 from notchflex.robot.value_names import PLURAL, SECTIONS, NamedPart, named_parts, parse_path
 
@@ -41,12 +42,12 @@ class PartsForm:
         for number, part in enumerate(parts):
             words = dict[str, Any]()
             for key, value in _values(part):
-                place = (number, key)
+                is_number = type(value) is float and math.isfinite(value)
                 # Directions decide which notches and tendons share a plane.
-                varies = (value != 0.0 or place in varied) and key != "direction_deg"
-                if type(value) is float and math.isfinite(value) and varies:
-                    places.append(place)
-                else:
+                is_number = is_number and key != "direction_deg"
+                if is_number and (value != 0.0 or (number, key) in varied):
+                    places.append((number, key))
+                elif value is not None:
                     words[key] = value
             content.append((type(part).__name__, words))
         return cls(repr((content, places)), (*parts,), places)
@@ -68,13 +69,23 @@ class PartsForm:
         return tuple(unchecked(part, **values) for part, values in pairs)
 
 
-def _values(part: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the values of a part by their keys, and behind its own parts theirs."""
-    for key in (field.name for field in dataclasses.fields(part)):
+@functools.cache  # asked for each robot of a batch
+def _keys(cls: type) -> tuple[tuple[str, bool], ...]:
+    """Return the keys of a part, and whether each may hold a part of its own."""
+    return tuple((field.name, field.name in own_parts(cls)) for field in dataclasses.fields(cls))
+
+
+def _values(part: Any) -> list[tuple[str, Any]]:
+    """Return the values of a part by their keys, and behind its own parts theirs."""
+    values: list[tuple[str, Any]] = []
+    for key, may_be_part in _keys(type(part)):
         value = getattr(part, key)
-        own = _values(value) if dataclasses.is_dataclass(value) else ()
-        yield key, type(value) if own else value
-        yield from ((f"{key}.{inner}", each) for inner, each in own)
+        if may_be_part and value is not None:
+            values.append((key, type(value)))
+            values += [(f"{key}.{inner}", each) for inner, each in _values(value)]
+        else:
+            values.append((key, value))
+    return values
 
 
 def parts_of(robot: Robot) -> tuple[Any, ...]:
