@@ -65,3 +65,12 @@ def test_files_keep_the_bend_and_the_drive(tmp_path):
     assert bends == [load.sheath_bend_deg for load in LOADS]
     assert ",200.0," in (tmp_path / "loops.csv").read_text()
     np.testing.assert_allclose(again.observed["drive_stroke"], seen.observed["drive_stroke"])
+
+
+def test_files_keep_a_temperature_of_zero(tmp_path):
+    wrist = ready("a").with_value("material.reference_temperature", 22.0)
+    cold = nf.pull(0.5, 1.0, steps=2).loaded(temperature=0.0)
+    seen = simulate_measurements(wrist, cold, observed=("total_angle",))
+    write_measurements(seen, tmp_path / "cold.csv")
+    again = read_measurements(tmp_path / "cold.csv", wrist)
+    assert [load.temperature for load in again.load.external] == [0.0, 0.0]

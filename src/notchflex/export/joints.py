@@ -12,7 +12,7 @@ lies where the circle comes closest to it, and the free robot keeps its shape.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise, product
 
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from notchflex import EquilibriumPath, InputError, Robot, Tendon, closing, pull, simulate
+from notchflex import EquilibriumPath, InputError, Robot, closing, pull, simulate
 from notchflex.export.cuts import Hole, tendon_holes
 from notchflex.support import check_number
 
@@ -368,12 +368,8 @@ def joint_model(robot: Robot, largest_tension: float | None = None) -> JointMode
         >>> len(joint_model(load_robot("pacheco2021-a"), 2.0).springs)
         5
     """
-    no_sheath: dict[str, None] = dict.fromkeys(_SHEATH)
-    bare = robot.replace(tendon=[replace(t, **no_sheath) for t in robot.tendon], drive=())
+    bare = robot.replace(tendon=[tendon.without_sheath() for tendon in robot.tendon], drive=())
     return replace(_fitted(bare, load_range(bare, largest_tension)), robot=robot)
-
-
-_SHEATH = [field.name for field in fields(Tendon) if field.name.startswith("sheath")] + ["backlash"]
 
 
 # MJCF, URDF and transmission table of one robot are often written together.

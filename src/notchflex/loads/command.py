@@ -471,7 +471,9 @@ def unlikely_loads(
     cold: list[InputWarning] = []
     for external in load.different:
         if external is not NOTHING:
-            cold = cold or [*too_cold(robot.material, "temperature", external.temperature)]
+            if external.temperature is not None and not cold:
+                for material in dict.fromkeys(robot.materials[1:]):
+                    cold += too_cold(material, "temperature", external.temperature)
             sizes = {
                 "tip_force": hypot(*external.tip_force),
                 "tip_moment": hypot(*external.tip_moment),

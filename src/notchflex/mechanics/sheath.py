@@ -9,6 +9,7 @@ nothing has changed. So ln T is a line of straight pieces, kept by its corners.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +50,10 @@ class Sheath(Pytree):
         none = constant(np.zeros(self.friction.shape))
         place = constant(np.tile(np.linspace(0.0, 1.0, _CORNERS), (len(none), 1)))
         return SheathMemory(none, place, 0.0 * place + np.log(_MIN_TENSION), none, none, none)
+
+    def wire_end(self, memory: SheathMemory) -> Float[Array, " t"]:
+        """Return the ways of the wires' ends at the drives, mm."""
+        return memory.stroke + self.compliance * mean_tension((memory.place, memory.level))
 
     def end_stretch(self, side: float, log_ratio: Array, tension: Array) -> Float[Array, " t"]:
         """Return the stretch, mm, of a wire that slides all along toward drive (1) or base (-1)."""
@@ -105,9 +110,9 @@ def within(memory: SheathMemory, limit: Float[Array, " t"]) -> Corners:
     # From the drive on the line is the old one, but nowhere steeper than the friction holds: behind
     # a piece that is too steep it goes on with the slope that holds until it meets the old one.
     # Nothing beyond moves, so a small change before stays small.
-    places, lines = list(memory.place.T), list(memory.level.T)
-    line, corners = lines[0], [(places[0], lines[0])]
-    for start, end, old, new in zip(places, places[1:], lines, lines[1:], strict=False):
+    first, *_ = before = [*zip(memory.place.T, memory.level.T, strict=True)]
+    line, corners = first[1], [first]
+    for (start, old), (end, new) in pairwise(before):
         width, step, gap = end - start, new - old, old - line
         apart, side, most = jnp.abs(gap) > _ROUNDING, jnp.sign(gap), limit * width
         nearer = most - side * step  # by so much the line comes nearer over the piece
@@ -118,7 +123,8 @@ def within(memory: SheathMemory, limit: Float[Array, " t"]) -> Corners:
         steep = jnp.abs(step) > most + _ROUNDING
         line = line + (1.0 - part) * jnp.where(steep, jnp.sign(step) * most, step)
         corners.append((end, line))
-    return jnp.stack([x for x, _ in corners], axis=1), jnp.stack([y for _, y in corners], axis=1)
+    place, level = (jnp.stack(values, axis=1) for values in zip(*corners, strict=True))
+    return place, level
 
 
 def from_drive(profile: Corners, end: Float[Array, " t"], limit: Float[Array, " t"]) -> Corners:

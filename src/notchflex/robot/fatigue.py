@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from notchflex.robot.kinds import PRINTABLE
+from notchflex.robot.kinds import PRINTABLE, celsius
 from notchflex.robot.part import MOST_STRAIN, Float, Problems, part, quantity
 
 _Strains = Annotated[
@@ -57,9 +57,7 @@ class Fatigue:
     reliability: Annotated[
         Float | None, quantity("", "part of the specimens that survive", above=0, at_most=1)
     ] = None
-    temperature: Annotated[
-        Float | None, quantity("deg C", "temperature of the tests", at_least=-273.15, at_most=200.0)
-    ] = None
+    temperature: Annotated[Float | None, celsius("temperature of the tests")] = None
     surface: Annotated[_Words, Field(description="surface of the specimens")] = None
     source: Annotated[_Words, Field(description="where the line is from")] = None
     corner_factor: Annotated[

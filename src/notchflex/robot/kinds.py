@@ -5,6 +5,7 @@ The folders are scanned, so that a new file is all that a new kind needs: readin
 JSON Schema and `--set` pick it up.
 """
 
+import dataclasses
 import datetime
 import functools
 import math
@@ -205,10 +206,14 @@ class Tendon:
         quantity("mm", "way of the drive on a reversal before the wire follows", at_least=0),
     ] = None
 
+    def without_sheath(self) -> "Tendon":
+        """Return the tendon as it is driven at the base."""
+        return dataclasses.replace(self, sheath_length=None, **dict.fromkeys(_OF_SHEATH))
+
     def conflicts(self) -> Problems:
         """Find a sheath without a wire, and values of a sheath that is not there."""
         if self.sheath_length is None:
-            for key in (*_OF_SHEATH, "backlash"):
+            for key in _OF_SHEATH:
                 if getattr(self, key) is not None:
                     yield key, "needs a sheath; give sheath_length [mm], or leave the key out."
         elif self.sheath_wire_stiffness is None:
@@ -219,7 +224,13 @@ class Tendon:
             )
 
 
-_OF_SHEATH = "sheath_friction", "sheath_bend_deg", "sheath_wire_stiffness", "sheath_stiffness"
+_OF_SHEATH = (
+    "sheath_friction",
+    "sheath_bend_deg",
+    "sheath_wire_stiffness",
+    "sheath_stiffness",
+    "backlash",
+)
 
 
 @part(kw_only=True)

@@ -29,9 +29,8 @@ def aimed(chain: Chain, command: Command, memory: SheathMemory | None) -> Comman
     """Return a command with strokes of the wires' ends: a drive first goes through its backlash."""
     if chain.sheath is None or memory is None or command.by_stroke is None:
         return command
-    profile = memory.place, memory.level
-    end = memory.stroke + chain.sheath.compliance * mean_tension(profile)
-    stroke = jnp.clip(end, command.target, command.target + chain.sheath.backlash)
+    end, backlash = chain.sheath.wire_end(memory), chain.sheath.backlash
+    stroke = jnp.clip(end, command.target, command.target + backlash)
     return command._replace(target=command.either(stroke, command.target))
 
 
@@ -71,7 +70,7 @@ def state_after(
     moved, end = ends(drive)
     tight = point.base_tension > 0.0
     tension = command.either(jnp.where(tight, jnp.exp(drive), 0.0), command.target)
-    motion = end - before.stroke - sheath.compliance * mean_tension((before.place, before.level))
+    motion = end - sheath.wire_end(before)
     turned = jnp.where(motion < -_MOTION, -sheath.backlash, before.play)
     turned = jnp.where(motion > _MOTION, 0.0, turned)
     play = command.either(jnp.clip(command.target - end, -sheath.backlash, 0.0), turned)

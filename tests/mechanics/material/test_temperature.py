@@ -248,3 +248,8 @@ def test_what_is_refused_and_what_is_warned_of():
     first = finish.notch[0].repeat + 1
     with pytest.warns(nf.InputWarning, match=rf"notch\[{first}\].material.temperature` is 10"):
         sections.with_value(f"notch[{first}].material.temperature", 10.0)
+    carried = MEASURED.replace(
+        material=nf.Linear(200e3, density=MEASURED.material.density), notch=[replace(own, repeat=5)]
+    )
+    with pytest.warns(nf.InputWarning, match="`temperature` is 10 deg C, below the austenite"):
+        nf.solve(carried, nf.Load(1.0, temperature=10.0))

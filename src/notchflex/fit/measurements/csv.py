@@ -447,8 +447,6 @@ def write_measurements(measurements: Measurements, target: str | Path) -> None:
     for name, pattern in _LOADS.items():
         values = np.array([getattr(load, name) for load in loads], float)
         table |= _filled(pattern, values if name in _OPTIONAL else _nan_for_zeros(values))
-        # Gravity of 0 differs from no gravity given, with which a mass hangs.
-        table |= _filled(pattern, values if name == "gravity" else _nan_for_zeros(values))
     bends = [getattr(load, _BEND) for load in loads]
     table |= _filled(_BEND, np.radians(np.array(bends, float)))
     for name, values in _on_bodies(loads).items():
