@@ -77,6 +77,16 @@ def test_drawn_and_let_go_in_small_steps(name, wrap, part, margin):
         margin.within("angles", path.notch_angle[step] - angle, ANGLE, "rad")
 
 
+def test_a_tendon_that_was_pulled_far_is_let_go_by_its_stroke():
+    """At the turn the residual first rises, as the 27 contacts leave their bounds together."""
+    robot = nf.load_robot("gao2017")
+    pulled = nf.simulate(robot, tensions(np.linspace(0.25, 30.0, 60))).raise_if_failed()
+    end = float(pulled.stroke[-1, 0])
+    drawn = nf.simulate(robot, strokes(np.arange(end, 2.0, -0.09)), from_state=pulled.state)
+    assert drawn.converged.all(), [reason for reason in drawn.reason if reason]
+    assert np.linalg.norm(drawn.tip_position[-1] - pulled.tip_position[-1]) > 5.0
+
+
 @pytest.mark.nightly
 def test_no_stroke_is_followed_to_a_tension_that_nothing_bears():
     """Beside the plane of its notches a tendon goes on bending closed notches sideways."""
