@@ -82,10 +82,10 @@ class _Attempt(NamedTuple):
     regularisation: Float[Array, ""] | float = 0.0
     factor: Float[Array, ""] | float = 0.0
 
-    def after_plain(self, converged: Array, can_relax: bool, can_snap: bool) -> _Attempt:
+    def after_plain(self, converged: Array) -> _Attempt:
         """Return what is tried after the equations as they are."""
         relaxed = self._replace(mode=_Mode.RELAXED, regularisation=_COMPLIANCE, factor=0.0)
-        return choose(converged, self._longer(), relaxed if can_relax else self._shorter(can_snap))
+        return choose(converged, self._longer(), relaxed)
 
     def after_relaxed(self, converged: Array, can_snap: bool) -> _Attempt:
         """Return what is tried after a relaxed shape, or after the equations from the last one."""
@@ -181,8 +181,6 @@ def solve_load_step(
     # tensions together: half the load step each.
     section = chain.rods.section
     can_snap = section.ends is not None or section.fibres is not None
-    # With a single tendon, contacts are never the reason for a failure.
-    can_relax = chain.tendons > 1
     max_iterations = settings.max_all_iterations * (_SNAP_FACTOR if can_snap else 1)
 
     def goes_on(state: _Substeps) -> Bool[Array, ""]:
@@ -199,10 +197,9 @@ def solve_load_step(
         target = interpolate_command(chain, command, last, end)
         new = _solve_substep(chain, target, state, settings, end, can_snap)
         result = _result_after(chain, state, new, target, end)
-        after = attempt.after_plain(new.converged, can_relax, can_snap)
-        if can_relax:
-            relaxed = attempt.after_relaxed(new.converged, can_snap)
-            after = choose(attempt.mode == _Mode.RELAXED, relaxed, after)
+        relaxed = attempt.after_relaxed(new.converged, can_snap)
+        plain = attempt.after_plain(new.converged)
+        after = choose(attempt.mode == _Mode.RELAXED, relaxed, plain)
         if can_snap:
             snapping = attempt.after_snapping(new.converged)
             after = choose(attempt.mode == _Mode.SNAPPING, snapping, after)

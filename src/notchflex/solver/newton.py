@@ -170,10 +170,9 @@ _MAX_BACKTRACKS = 7
 # contacts leave their bounds at once, and the residual rises before it falls.
 _UNGUARDED_STEPS = 8
 # With a stroke commanded, the predictor sets the contacts in the first iterations, while the
-# residual is above this value. Where other tendons bend the robot too, contacts also slide at
-# constant base tension: the predictor does not know these, and Newton's method finds them. After
-# the first steps, it then takes over once a step leaves more than this part of the residual
-# (tests/solver/test_many_strokes.py). A single tendon that reverses needs the predictor throughout.
+# residual is above this value and, after the first steps, as long as each leaves at most this part
+# of it. Where other tendons bend the robot, contacts also slide at constant base tension: the
+# predictor does not know these, and Newton's method finds them (tests/solver/test_many_strokes.py).
 _PREDICTOR_STEPS, _PREDICTOR_SURE_STEPS = 15, 2
 _PREDICTOR_MIN_RESIDUAL, _PREDICTOR_FALL = 1e-4, 0.5
 # A residual below this multiple of the tolerance that no longer falls is rounding error.
@@ -320,11 +319,10 @@ def _next_step(
         return search.predicts, limited(linear_fraction), linear_fraction
     assert command.by_stroke is not None
     before = search.best
-    early = search.predicts & (before.iterations < _PREDICTOR_STEPS)
+    helps = new.residual < _PREDICTOR_FALL * before.residual
+    helps = helps | (before.iterations < _PREDICTOR_SURE_STEPS)
+    early = search.predicts & helps & (before.iterations < _PREDICTOR_STEPS)
     early = jnp.any(command.by_stroke) & early & (new.residual > _PREDICTOR_MIN_RESIDUAL)
-    if chain.tendons > 1:
-        helps = new.residual < _PREDICTOR_FALL * before.residual
-        early = early & (helps | (before.iterations < _PREDICTOR_SURE_STEPS))
 
     def predicted() -> Iterate:
         limits = memory._replace(bound=new.bound)
