@@ -39,3 +39,31 @@ def test_thirty_notches_are_followed(friction: float) -> None:
     robot = short.replace(notch=notches, tendon=tendons, friction=nf.Capstan(friction))
     path = nf.simulate(robot, circling(robot, 0.05, 1.5, 1.0, 60))
     assert path.converged.all(), path[int(np.argmin(path.converged))].reason
+
+
+@pytest.mark.parametrize("seed", [1, 5])
+def test_two_contacts_at_a_thin_disk_share_what_they_hold(seed: int) -> None:
+    """Nine tendons bend one segment after the other; disks have no thickness."""
+    sides = [120.0 * tendon + 40.0 * segment for segment in range(3) for tendon in range(3)]
+    elastic = {"axial_stiffness": 1000.0, "free_length": 100.0}
+    tendons = tuple(
+        nf.Tendon(4.5, side, end_body=10 * (1 + number // 3), path="straight", **elastic)
+        for number, side in enumerate(sides)
+    )
+    gaps = (nf.RodGap(6.0, 1.0, uncut_length=0.0, repeat=30),)
+    steel = nf.Linear(50e3, poisson_ratio=0.3)
+    robot = nf.Robot("segments", nf.Tube(11.0, 1.0), gaps, tendons, steel, nf.Capstan(0.3))
+    random = np.random.default_rng(seed)
+    bend, strokes = np.zeros((3, 2)), list[np.ndarray]()
+    for segment in (0, 2, 1, 2, 0):
+        further = bend.copy()
+        further[segment] = random.uniform(-4.0, 4.0, 2)
+        for part in np.linspace(0.0, 1.0, 7)[1:]:
+            bent = np.repeat(bend + part * (further - bend), 3, axis=0)
+            angle = np.radians(sides)
+            drawn = bent[:, 0] * np.cos(angle) + bent[:, 1] * np.sin(angle)
+            strokes.append(np.round(drawn, 2) - 0.2)
+        bend = further
+    path = nf.simulate(robot, nf.LoadPath(stroke=np.array(strokes)))
+    assert path.converged.all(), path[int(np.argmin(path.converged))].reason
+    assert np.mean(path.iterations) < 20.0

@@ -525,9 +525,8 @@ def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
         rows = jnp.stack([before, tendon.gap_tension], axis=2)
         limit = limit + slope(still, still + 1.0)[..., None] * rows
     height = notch_heights(chain)[:, None, None, None]
-    stuck = -AUGMENTATION * (
-        tendon.at_edges / height - jacobians.memory.slip_per_log_ratio * tendon.log_ratio[None]
-    )
+    compliance = jacobians.memory.slip_per_log_ratio(chain, group)[..., None]
+    stuck = -AUGMENTATION * (tendon.at_edges / height - compliance * tendon.log_ratio[None])
     value, bound = trial_log_ratio(chain, log_ratio, span.slid, jacobians.memory, k), span.bound
     upper, lower = (value >= bound)[..., None], (value <= -bound)[..., None]
     slides = tendon.log_ratio[None] - jnp.where(upper, limit, -limit)

@@ -144,8 +144,12 @@ def in_tendon_order(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...])
 # convergence and drops out at the solution; the compliance c of sticking contacts keeps the law
 # regular where a slack tendon leaves the tension ratio undefined. Slip is in heights of the notch,
 # so that a scaled robot is solved in the same way.
+#
+# Two contacts at one place, such as both edges of a disk without thickness, share what they hold in
+# any way while they stick. On a tendon that stretches they are found with a compliance that is this
+# part of the stretch by the closing force (tests/solver/test_many_strokes.py).
 AUGMENTATION = 8.0
-MIN_STICK_COMPLIANCE = 1e-15
+_MIN_STICK_COMPLIANCE, _STICK_STRETCH = 1e-15, 1e-10
 
 
 class Unknowns(NamedTuple):
@@ -198,14 +202,11 @@ class Memory(NamedTuple):
     stick_compliance: Float[Array, ""] | None = None
     sheath: SheathMemory | None = None
 
-    @property
-    def slip_per_log_ratio(self) -> Float[Array, ""] | float:
+    def slip_per_log_ratio(self, chain: Chain, group: TendonGroup) -> Float[Array, "1 t 1"]:
         """Slip over a sticking contact per change of its log ratio, in heights of the notch."""
-        return (
-            MIN_STICK_COMPLIANCE
-            if self.stick_compliance is None
-            else MIN_STICK_COMPLIANCE + self.stick_compliance
-        )
+        stretch = chain.closing_force / of_group(chain.axial_stiffness, group)[None, :, None]
+        least = _MIN_STICK_COMPLIANCE + _STICK_STRETCH * stretch
+        return least if self.stick_compliance is None else least + self.stick_compliance
 
 
 def notch_heights(chain: Chain) -> Float[Array, " n"]:
@@ -222,9 +223,8 @@ def trial_log_ratio(
 ) -> Float[Array, "n t 2"]:
     """Compute the trial log ratios of the k-th group from the slip, before they are clipped."""
     slip = (slid - memory.slid[k]) / notch_heights(chain)[:, None, None]
-    return log_ratio + AUGMENTATION * (
-        slip - memory.slip_per_log_ratio * (log_ratio - memory.log_ratio[k])
-    )
+    compliance = memory.slip_per_log_ratio(chain, chain.groups[k])
+    return log_ratio + AUGMENTATION * (slip - compliance * (log_ratio - memory.log_ratio[k]))
 
 
 def clip_symmetric(value: Float[Array, ...], limit: Float[Array, ...]) -> Float[Array, ...]:
