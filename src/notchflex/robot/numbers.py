@@ -112,6 +112,8 @@ def robot_of(parts: Sequence[Any]) -> Robot:
 
 def places_by_name(robot: Robot, names: Sequence[str]) -> tuple[Robot, list[list[Place]]]:
     """Return where named values stand in a robot, with its notches apart where a name is of one."""
+    if not names:
+        return robot, []  # most robots of a batch, which are listed one by one
     targets = [parse_path(name) for name in names]
     single = any(target.section == "notch" and target.number is not None for target in targets)
     if single and len(robot.notch) < robot.number_of_notches:
