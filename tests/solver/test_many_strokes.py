@@ -41,11 +41,14 @@ def test_thirty_notches_are_followed(friction: float) -> None:
     assert path.converged.all(), path[int(np.argmin(path.converged))].reason
 
 
-@pytest.mark.parametrize("seed", [1, 5])
-def test_two_contacts_at_a_thin_disk_share_what_they_hold(seed: int) -> None:
-    """Nine tendons bend one segment after the other; disks have no thickness."""
+@pytest.mark.parametrize(("seed", "free_length"), [(1, 100.0), (5, 100.0), (1, 0.0), (2, 0.0)])
+def test_two_contacts_at_a_thin_disk_share_what_they_hold(seed: int, free_length: float) -> None:
+    """Nine tendons bend one segment after the other; disks have no thickness.
+
+    Without a length before the base the drive can have any tension while the first contact sticks.
+    """
     sides = [120.0 * tendon + 40.0 * segment for segment in range(3) for tendon in range(3)]
-    elastic = {"axial_stiffness": 1000.0, "free_length": 100.0}
+    elastic = {"axial_stiffness": 1000.0, "free_length": free_length}
     tendons = tuple(
         nf.Tendon(4.5, side, end_body=10 * (1 + number // 3), path="straight", **elastic)
         for number, side in enumerate(sides)
@@ -66,4 +69,4 @@ def test_two_contacts_at_a_thin_disk_share_what_they_hold(seed: int) -> None:
         bend = further
     path = nf.simulate(robot, nf.LoadPath(stroke=np.array(strokes)))
     assert path.converged.all(), path[int(np.argmin(path.converged))].reason
-    assert np.mean(path.iterations) < 20.0
+    assert free_length == 0.0 or np.mean(path.iterations) < 20.0

@@ -151,12 +151,13 @@ class _Substeps(NamedTuple):
 
 
 # Scaled residuals that states before the end of a load step need, as they only provide the history,
-# and relaxed shapes, from which the next one starts.
-_SUBSTEP_RESIDUAL, _RELAXED_RESIDUAL = 1e-10, 1e-8
+# and relaxed shapes, from which the next one starts; these also need this part of their compliance,
+# below which a contact that sticks cannot be told from one that slides.
+_SUBSTEP_RESIDUAL, _RELAXED_RESIDUAL, _RELAXED_PART = 1e-10, 1e-8, 1e-3
 # Iterations of a relaxed shape: what is not found in a few would be found by luck of rounding.
-_RELAXED_ITERATIONS = 10
+_RELAXED_ITERATIONS = 20
 # First and smallest compliance, and the factors from one relaxed shape to the next.
-_COMPLIANCE, _MIN_COMPLIANCE, _FACTOR, _MAX_FACTOR = 1e-1, 1e-8, 1e-1, 0.8
+_COMPLIANCE, _MIN_COMPLIANCE, _FACTOR, _MAX_FACTOR = 1e-1, 1e-11, 1e-1, 0.8
 # Shorter substeps may be solved with a viscosity: the first, the smallest and the largest.
 _SNAP_MAX_FRACTION, _VISCOSITY, _MIN_VISCOSITY, _MAX_VISCOSITY = 0.3, 0.1, 1e-4, 30.0
 # Factor on the allowed iterations of a load with snaps, of which one took 625 in 71 paths of wrists
@@ -276,7 +277,8 @@ def _solve_substep(
         memory = memory._replace(damping=(viscosity, state.start.unknowns.modes))
     relaxed = compliance > 0.0
     residual_target = jnp.where(end < 1.0, _SUBSTEP_RESIDUAL, 0.0)
-    residual_target = jnp.where(relaxed, _RELAXED_RESIDUAL, residual_target)
+    enough = jnp.minimum(_RELAXED_RESIDUAL, _RELAXED_PART * compliance)
+    residual_target = jnp.where(relaxed, enough, residual_target)
     most = jnp.where(relaxed, _RELAXED_ITERATIONS, settings.max_iterations)
     settings = dataclasses.replace(settings, max_iterations=most)
     aim = aimed(chain, command, memory.sheath)

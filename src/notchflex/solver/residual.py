@@ -149,7 +149,7 @@ def in_tendon_order(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...])
 # any way while they stick. On a tendon that stretches they are found with a compliance that is this
 # part of the stretch by the closing force (tests/solver/test_many_strokes.py).
 AUGMENTATION = 8.0
-_MIN_STICK_COMPLIANCE, _STICK_STRETCH = 1e-15, 1e-10
+_MIN_STICK_COMPLIANCE, _STICK_STRETCH = 1e-15, 1e-9
 
 
 class Unknowns(NamedTuple):
