@@ -363,3 +363,13 @@ def test_a_fit_makes_no_program_of_xla(monkeypatch):
     found = calibrate(WRIST, seen, names, starts=1, priors=False, intervals=False)
     assert found.converged
     assert next_measurement(found, nf.pull(0.3, 1.8, steps=4)).converged.all()
+
+
+def test_a_slack_is_found_where_opposite_tendons_are_let_go():
+    """Strokes below 0 are no strokes of 0: the tendon opposite is released."""
+    robot = nf.load_robot("two-axis-wrist")
+    drawn = np.linspace(0.1, 0.6, 5)[:, None] * [1.0, 0.4, -1.0, -0.4]
+    truth = simulate_measurements(robot, nf.LoadPath(stroke=drawn - 0.05))
+    seen = dataclasses.replace(truth, load=nf.LoadPath(stroke=drawn))
+    found = calibrate(robot, seen, "sensor.stroke_slack", starts=1, priors=False, intervals=False)
+    assert found.values["sensor.stroke_slack"] == pytest.approx(0.05, abs=1e-6)

@@ -101,7 +101,7 @@ class Sample:
         offset, factor, slack = (numbers.get(name, row.neutral) for name, row in SENSOR.items())
         tension = factor * (self.measured.measured_tension[order] - offset)
         stroke = self.measured.load.stroke[order] - slack
-        return replace(load, tension=np.maximum(tension, 0.0), stroke=np.maximum(stroke, 0.0))
+        return replace(load, tension=np.maximum(tension, 0.0), stroke=stroke)
 
     def _changes(
         self, path: EquilibriumPath, load: LoadPath, numbers: Mapping[str, float]
@@ -127,8 +127,8 @@ class Sample:
         command = SENSOR[name].command
         value, step = getattr(load, command), 1.0 if name == "sensor.force_factor" else -1.0
         moved = getattr(self._load({**numbers, name: numbers[name] + step}), command)
-        # Below 0 N the robot has no tension, whatever the sensor shows.
-        moved = np.where(value > 0.0, moved, value)
+        # Below 0 N the robot has no tension, whatever the sensor shows; strokes are released too.
+        moved = np.where((command == "stroke") | (value > 0.0), moved, value)
         return step * load_change(path, replace(load, **{command: moved}))
 
 
