@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from notchflex.robot.cuts import CutLayout, whole_gap
 from notchflex.robot.kinds import Notch, Tendon, Tube
-from notchflex.robot.part import Float, Problems, part, quantity
+from notchflex.robot.part import Float, Problems, part, positive, quantity
 
 
 @part
@@ -34,12 +34,8 @@ class RodGap(Notch):
         20.0
     """
 
-    length: Annotated[
-        Float, quantity("mm", "free length of the backbone", above=0, usual=(0.1, 500))
-    ]
-    diameter: Annotated[
-        Float, quantity("mm", "outer diameter of the backbone", above=0, usual=(0.05, 50))
-    ]
+    length: Annotated[Float, positive("mm", "free length of the backbone", usual=(0.1, 500))]
+    diameter: Annotated[Float, positive("mm", "outer diameter of the backbone", usual=(0.05, 50))]
     inner_diameter: Annotated[
         Float, quantity("mm", "inner diameter of the backbone; 0 is round", at_least=0)
     ] = 0.0
