@@ -533,7 +533,17 @@ class BatchRows:
         with closing(solving) as pieces:
             for (_, rows), piece in zip(work, pieces, strict=True):
                 for name, values in piece.items():
-                    _store(arrays, name, rows, values, count)
+                    # NaN where robots have fewer notches than others.
+                    missing = np.nan if values.dtype.kind == "f" else 0
+                    shape = count, *values.shape[1:]
+                    array = arrays.get(name, np.full(shape, missing, values.dtype))
+                    wider = np.maximum(array.shape, shape) - array.shape
+                    if wider.any():
+                        array = np.pad(
+                            array, [(0, more) for more in wider], constant_values=missing
+                        )
+                    array[(rows, *map(slice, shape[1:]))] = values
+                    arrays[name] = array
                 done += len(rows)
                 if progress is not None:
                     progress(done, count)
@@ -575,11 +585,17 @@ class BatchTable:
         names, turn = self.batch.outputs, self.batch.loads.load.base_to_world
         needed = (source for name in names for source in WORKS.get(name, (name,)))
         followed = self.followed(rows, (*dict.fromkeys(needed),))
-        quantities = followed.outputs
-        outputs = {
-            name: _work(quantities, name) if name in WORKS else quantities[name]
-            for name in sorted(names)
-        }
+        outputs: dict[str, np.ndarray] = {}
+        for name in sorted(names):
+            if name not in WORKS:
+                outputs[name] = followed.outputs[name]
+                continue
+            # Since rest, where force and length are 0.
+            force, length = (
+                (np.concatenate([np.zeros_like(after[:, :1]), after[:, :-1]], axis=1), after)
+                for after in (followed.outputs[quantity] for quantity in WORKS[name])
+            )
+            outputs[name] = np.cumsum(work_of_steps(force, length), axis=1)
         failed = ~outputs["converged"]
         for name, values in outputs.items():
             if name in REGISTERED and values.dtype.kind == "f":
@@ -614,25 +630,3 @@ class FollowedRows(NamedTuple):
     commands: Float[np.ndarray, "k s command"]  # packed loads
     layout: PytreeLayout  # of one load
     outputs: dict[str, np.ndarray]
-
-
-def _work(outputs: Mapping[str, np.ndarray], name: str) -> np.ndarray:
-    """Return the work since rest, where force and length are 0, rows and steps as leading axes."""
-    force, length = (
-        (np.concatenate([np.zeros_like(after[:, :1]), after[:, :-1]], axis=1), after)
-        for after in (outputs[quantity] for quantity in WORKS[name])
-    )
-    return np.cumsum(work_of_steps(force, length), axis=1)
-
-
-def _store(
-    arrays: dict[str, np.ndarray], name: str, rows: np.ndarray, values: np.ndarray, count: int
-) -> None:
-    """Store the values of some rows; NaN where robots have fewer notches than others."""
-    missing = np.nan if values.dtype.kind == "f" else 0
-    array = arrays.get(name, np.full((count, *values.shape[1:]), missing, values.dtype))
-    wider = np.maximum(array.shape[1:], values.shape[1:]) - array.shape[1:]
-    if wider.any():
-        array = np.pad(array, [(0, more) for more in (0, *wider)], constant_values=missing)
-    array[(rows, *(slice(size) for size in values.shape[1:]))] = values
-    arrays[name] = array

@@ -280,14 +280,20 @@ def closing(robot: Robot) -> Closing:
     arm = moment_arms(chain)
     tendon, longest = arm.argmax(axis=1), arm.max(axis=1)
     has_spine = np.isfinite(closing_angle)
+    ready, contact_angle = prepare(robot), np.full(len(height), np.nan)
     if not any(pair.acts_on_bodies for pair in chain.contact_pairs):
-        tension, status = _tensions(prepare(robot), tendon, longest, closing_angle)
-        contact_angle = np.full(len(height), np.nan)
+        tension, status = _tensions(ready, tendon, longest, closing_angle)
     else:
         # A backbone has no edges that meet.
         meets = sum((pair.has_contact.sum(axis=-1) for pair in chain.contact_pairs), 0.0 * longest)
-        arms = longest * (meets > 0.0)
-        tension, contact_angle, status = _edge_closing(prepare(robot), tendon, arms)
+        tension, status = contact_angle.copy(), np.full(len(height), ClosingStatus.NEVER, object)
+        for number in np.unique(tendon):
+            # It is pulled in steps from rest, which brackets the tension where an edge touches.
+            pulled = np.flatnonzero((tendon == number) & (longest > 0.0) & (meets > 0.0))
+            if len(pulled):
+                tension[pulled], contact_angle[pulled], status[pulled] = _by_one_tendon(
+                    ready, int(number), pulled
+                )
     elastic = np.where(has_spine, closing_angle / height, np.nan)
     first = jax.tree.map(lambda leaf: leaf[:, 0], section)
     outer, peak = _strains(chain.law, first, elastic, chain.law.rest(first))
@@ -352,22 +358,6 @@ def _tensions(
     linear = np.asarray(chain.stiffness)[notches, 0] * closing_angle[notches] / arm[notches]
     tension[notches], status[notches] = closing_tensions(overlap, linear)
     return tension, status
-
-
-def _edge_closing(
-    ready: PreparedChain, tendon: np.ndarray, arm: Float[np.ndarray, " n"]
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], np.ndarray]:
-    """Find tension, angle and status of closing for notches with edges on rigid pieces."""
-    # The tendon is pulled in steps from rest, which brackets the tension where an edge touches.
-    tension, angle = (np.full(ready.chain.flexures, np.nan) for _ in range(2))
-    status = np.full(ready.chain.flexures, ClosingStatus.NEVER, dtype=object)
-    for number in np.unique(tendon):
-        pulled = np.flatnonzero((tendon == number) & (arm > 0.0))
-        if len(pulled):
-            tension[pulled], angle[pulled], status[pulled] = _by_one_tendon(
-                ready, int(number), pulled
-            )
-    return tension, angle, status
 
 
 def _by_one_tendon(

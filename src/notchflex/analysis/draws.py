@@ -218,7 +218,11 @@ def _assumed(robot: Robot) -> Iterator[Tolerance]:
         if _is_number(robot, name):
             yield replace(_FRICTION, value=name)
     yield from _tendon_radius(robot)
-    yield from _law(robot)
+    # The errors of the law of notches with elastic ends, the last one's if it differs.
+    sizes = {name: f"{100.0 * error:.2g} %" for name, error in law_errors(robot).items()}
+    for name, size in sizes.items():
+        if name == "notch" or size != sizes.get("notch"):
+            yield Tolerance(f"{name}.stiffness_factor", sd=size)
 
 
 def _material(path: str, material: Material, robot: Robot) -> Iterator[Tolerance]:
@@ -226,7 +230,9 @@ def _material(path: str, material: Material, robot: Robot) -> Iterator[Tolerance
     for name, field in fields_of(type(material)).items():
         value = f"{path}.{name}"
         if unit_of(field) == "MPa" and name not in _LEFT_OUT and _is_number(robot, value):
-            yield _between(value, *limits.get(name, _MODULUS))
+            lower, mean, upper = limits.get(name, _MODULUS)
+            plus, minus = upper / mean - 1.0, 1.0 - lower / mean
+            yield Tolerance(value, plus=f"{100 * plus:.3g} %", minus=f"{100 * minus:.3g} %")
 
 
 def _tendon_radius(robot: Robot) -> Iterator[Tolerance]:
@@ -239,14 +245,6 @@ def _tendon_radius(robot: Robot) -> Iterator[Tolerance]:
         yield _RADIUS
 
 
-def _law(robot: Robot) -> Iterator[Tolerance]:
-    """Yield the errors of the law of notches with elastic ends, the last one's if it differs."""
-    sizes = {name: f"{100.0 * error:.2g} %" for name, error in law_errors(robot).items()}
-    for name, size in sizes.items():
-        if name == "notch" or size != sizes.get("notch"):
-            yield Tolerance(f"{name}.stiffness_factor", sd=size)
-
-
 def _wall(diameter: float) -> float:
     """Return the standard deviation of a wall, or of a wire, drawn to a diameter [mm]."""
     return max(WALL, WALL_OF_DIAMETER * diameter)
@@ -254,11 +252,6 @@ def _wall(diameter: float) -> float:
 
 def _rounded(size: float) -> float:
     return float(f"{size:.2g}")
-
-
-def _between(name: str, lower: float, usual: float, upper: float) -> Tolerance:
-    plus, minus = upper / usual - 1.0, 1.0 - lower / usual
-    return Tolerance(name, plus=f"{100 * plus:.3g} %", minus=f"{100 * minus:.3g} %")
 
 
 def _is_number(robot: Robot, path: str) -> bool:

@@ -221,7 +221,14 @@ def path_gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> G
     long = path.prepared.long
     tangents = PathTangents(path, tuple(weights))
     layouts = tangents.layouts
-    seeds = _packed(path, weights)
+    # Weights in the frame of the base, for the outputs of the long chain.
+    turn = path.load.base_to_world
+    back = None if turn is None else turn.T
+    shapes = reported_shapes(long.static_structure, long.state, tuple(weights))
+    seeds = np.zeros((len(path), sum(int(np.prod(shape)) for shape in shapes.values()) + 1))
+    for name, index in unpadded_entries(path.prepared, [*weights]).items():
+        seeds[:, index] = REGISTERED[name].turned(weights[name], back)
+    seeds = seeds[:, :-1]  # the last column takes what is beyond the end of a tendon
     # No step beyond the last that counts: one that failed there must not matter.
     backwards = slice(int(np.flatnonzero(seeds.any(axis=1)).max(initial=0)), None, -1)
     steps = [array[backwards] for array in (*tangents.steps, tangents.loads, seeds)]
@@ -235,19 +242,6 @@ def path_gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> G
     by_chain, numbers = result["chain"].sum(axis=0), path.prepared.own_numbers
     size = path.prepared.chain_layout.size + 1
     return Gradient(loads, np.bincount(numbers, by_chain, size)[1:])
-
-
-def _packed(
-    path: EquilibriumPath, weights: Mapping[str, np.ndarray]
-) -> Float[np.ndarray, "s outputs"]:
-    """Pack weights in the frame of the base, for the outputs of the long chain."""
-    turn, long = path.load.base_to_world, path.prepared.long
-    back = None if turn is None else turn.T
-    shapes = reported_shapes(long.static_structure, long.state, tuple(weights))
-    seeds = np.zeros((len(path), sum(int(np.prod(shape)) for shape in shapes.values()) + 1))
-    for name, index in unpadded_entries(path.prepared, [*weights]).items():
-        seeds[:, index] = REGISTERED[name].turned(weights[name], back)
-    return seeds[:, :-1]  # the last column takes what is beyond the end of a tendon
 
 
 @Native

@@ -136,7 +136,11 @@ class Comparison:
         return branch_words(off, "total_angle", self.measured)
 
     def _rms(self, errors: Numbers) -> Numbers:
-        return root_mean_square(errors[self.converged])
+        """Return the root mean square over the rows that were solved; NaN without any."""
+        errors = errors[self.converged]
+        count = np.isfinite(errors).sum(axis=0)
+        total = np.nansum(errors**2, axis=0)
+        return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
 
     def __repr__(self) -> str:
         """Return the errors on a few lines."""
@@ -158,13 +162,6 @@ class Comparison:
     def _repr_html_(self) -> str:
         """Return the same for a notebook."""
         return f"<pre>{escape(repr(self))}</pre>"
-
-
-def root_mean_square(errors: Numbers) -> Numbers:
-    """Return the root mean square over the rows; NaN without any."""
-    count = np.isfinite(errors).sum(axis=0)
-    total = np.nansum(errors**2, axis=0)
-    return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
 
 
 def _number(value: float) -> str:

@@ -77,11 +77,6 @@ class HingeSpring:
         """Angles over the whole range."""
         return np.linspace(self.low, self.high, 201)
 
-    @property
-    def largest_stiffness(self) -> float:
-        """Largest slope of the elastic moment over the range."""
-        return float(np.abs(np.gradient(self.moment(self.range), self.range)).max())
-
     def drum(self) -> tuple[float, float, Array] | None:
         """Return the friction as that of a drum which the hinge turns by a polynomial of its angle.
 

@@ -99,7 +99,19 @@ def next_measurement(
     """
     label = robot or next(iter(found.given))
     noise = dict(deviation or {})
-    _check(found, label, narrow, noise)
+    if label not in found.given:
+        raise InputError.UNKNOWN_NAME(
+            f"no robot of this fit is called {label}; there are {', '.join(found.given)}"
+        )
+    for name in narrow:
+        found.number_of(name)
+    if found.tells_no_noise:
+        raise InputError.TOO_FEW_DATA(
+            "the noise is unknown, so that the gain of another measurement is unknown; "
+            "measure more, or give standard deviations"
+        )
+    if any(not 0.0 < value < np.inf for value in noise.values()):
+        raise InputError.OUT_OF_RANGE("a deviation of the next measurement must be above 0")
     path = load_path(candidates, found.robots[label].number_of_tendons)
     measured = found.problem.samples.of_robot(label)
     if observed is None:
@@ -125,24 +137,6 @@ def next_measurement(
     return NextMeasurement(
         label, path, narrower, volume, found.names, tuple(narrow), np.isfinite(volume)
     )
-
-
-def _check(
-    calibration: Calibration, label: str, narrow: Sequence[str], deviation: Mapping[str, float]
-) -> None:
-    if label not in calibration.given:
-        raise InputError.UNKNOWN_NAME(
-            f"no robot of this fit is called {label}; there are {', '.join(calibration.given)}"
-        )
-    for name in narrow:
-        calibration.number_of(name)
-    if calibration.tells_no_noise:
-        raise InputError.TOO_FEW_DATA(
-            "the noise is unknown, so that the gain of another measurement is unknown; "
-            "measure more, or give standard deviations"
-        )
-    if any(not 0.0 < value < np.inf for value in deviation.values()):
-        raise InputError.OUT_OF_RANGE("a deviation of the next measurement must be above 0")
 
 
 def _noise_so_far(calibration: Calibration, name: str) -> float:

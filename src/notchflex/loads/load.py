@@ -389,8 +389,15 @@ class Load(ExternalLoad):
         super().__post_init__()
         values = vars(self)
         for name in ("tension", "stroke"):
-            if values[name] is not None:
-                values[name] = _commanded(values[name], name)
+            value = values[name]
+            if hasattr(value, "__array__"):
+                value = np.asarray(value).tolist()
+            if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+                values[name] = tuple(
+                    None if each is None else _finite(each, name) for each in value
+                )
+            elif value is not None:
+                values[name] = _finite(value, name)
         if self.base_rotation is not NO_VECTOR:
             values["base_rotation"] = check_turn(self.base_rotation)
 
@@ -412,15 +419,6 @@ class Load(ExternalLoad):
                 f"give at most {tendons}"
             )
         return entries + (None,) * (tendons - len(entries))
-
-
-def _commanded(value: Any, what: str) -> float | tuple[float | None, ...]:
-    """Return a command as a finite number, or as one per tendon and None where there is none."""
-    if hasattr(value, "__array__"):
-        value = np.asarray(value).tolist()
-    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
-        return tuple(None if entry is None else _finite(entry, what) for entry in value)
-    return _finite(value, what)
 
 
 def _finite(value: Any, what: str, form: str = _PER_TENDON) -> float:

@@ -243,15 +243,6 @@ def _dimension(
     yield _stroke([first, last], width=0.7)
 
 
-def _broken(x: float, low: float, high: float) -> Iterator[Mark]:
-    """Yield the mark of an omitted part: a white band between two zigzag lines."""
-    y = np.linspace(low - 0.06, high + 0.06, 13)
-    aside = 0.035 * np.where(np.arange(13) % 2 == 0, -1.0, 1.0)
-    left, right = (np.column_stack([x + side + aside, y]) for side in (-0.035, 0.035))
-    yield Area([np.concatenate([left, right[::-1]])], "white", 1.0)
-    yield from (_stroke(left, INK), _stroke(right, INK))
-
-
 def dimensioned_figure(robot: Robot) -> Figure:
     """Draw the tube and every shape of notch with their dimensions, to scale [mm].
 
@@ -433,8 +424,12 @@ def _side_view(row: NotchRow) -> Iterator[Mark]:
     for x, free in ((0.0, row.held), (length, row.tip)):
         if free:
             yield _ink([(x, -outer), (x, outer)])
-    for place in row.breaks:
-        yield from _broken(scale * place, -outer, outer)
+    for place in row.breaks:  # what is omitted: a white band between two zigzag lines
+        y = np.linspace(-outer - 0.06, outer + 0.06, 13)
+        aside = 0.035 * np.where(np.arange(13) % 2 == 0, -1.0, 1.0)
+        left, right = (np.column_stack([scale * place + x + aside, y]) for x in (-0.035, 0.035))
+        yield Area([np.concatenate([left, right[::-1]])], "white", 1.0)
+        yield from (_stroke(left, INK), _stroke(right, INK))
     if row.held:  # hatched, as what is fixed
         for y in np.arange(-outer, outer, 0.12):
             yield _ink([(-0.1, y), (0.0, y + 0.1)], 0.5)

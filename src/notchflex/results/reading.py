@@ -270,7 +270,14 @@ def read_table(file: str | Path) -> dict[str, NDArray[Any]]:
             f"{file} has no column of a path (such as {QUANTITIES['total_angle'].header()}); give "
             "a table that --csv or --parquet wrote."
         )
-    return {name: _joined(QUANTITIES[name], parts) for name, parts in entries.items()}
+    arrays: dict[str, NDArray[Any]] = {}
+    for name, parts in entries.items():
+        first, shape = next(iter(parts.values())), np.max(list(parts), axis=0) + 1
+        empty = np.nan if first.dtype.kind == "f" else 0
+        arrays[name] = np.full((len(first), *shape), empty, first.dtype)
+        for index, values in parts.items():
+            arrays[name][(slice(None), *index)] = values
+    return arrays
 
 
 def _place(header: str) -> tuple[Quantity, tuple[int, ...]] | None:
@@ -301,15 +308,3 @@ def _numbers(quantity: Quantity, values: Sequence[Any]) -> NDArray[Any]:
     if quantity.kind is bool:
         return numbers != 0.0
     return numbers.astype(int) if quantity.kind is int else numbers / quantity.scale
-
-
-def _joined(quantity: Quantity, parts: Mapping[tuple[int, ...], NDArray[Any]]) -> NDArray[Any]:
-    if not quantity.per:
-        return parts[()]
-    first = next(iter(parts.values()))
-    shape = np.max(list(parts), axis=0) + 1
-    empty = np.nan if first.dtype.kind == "f" else 0
-    array = np.full((len(first), *shape), empty, first.dtype)
-    for index, values in parts.items():
-        array[(slice(None), *index)] = values
-    return array

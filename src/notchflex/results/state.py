@@ -201,7 +201,14 @@ class State(ByValue, Displayed):
                 robot = robot_from_text(str(robot))
             except InputError:
                 raise _damaged(path, "the description of its robot cannot be read") from None
-        read = {name: _array(path, name, numbers) for name, numbers in arrays.items()}
+        read: dict[str, np.ndarray] = {}
+        for name, numbers in arrays.items():
+            try:
+                read[name] = np.asarray(numbers, float)
+            except (TypeError, ValueError, OverflowError):
+                raise _damaged(path, f"{name} is not a table of numbers") from None
+            if not np.isfinite(read[name]).all():
+                raise _damaged(path, f"{name} holds what is not a finite number")
         return cls(**facts, arrays=read, description=robot, source=str(path))
 
     def fitted(self, chain: Chain) -> SolverState:
@@ -253,17 +260,6 @@ def _in_space(solved: SolverState, chain: Chain, *, reduce: bool = False) -> Sol
     if solved.applied is None or chain.frame is None:
         return solved
     return solved._replace(applied=in_space(solved.applied, chain.frame, reduce=reduce))
-
-
-def _array(source: str | FilePath, name: str, numbers: Any) -> np.ndarray:
-    """Return numbers of a file as an array."""
-    try:
-        array = np.asarray(numbers, float)
-    except (TypeError, ValueError, OverflowError):
-        raise _damaged(source, f"{name} is not a table of numbers") from None
-    if not np.isfinite(array).all():
-        raise _damaged(source, f"{name} holds what is not a finite number")
-    return array
 
 
 def _damaged(source: str | FilePath, what: str) -> InputError:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from notchflex.errors import InputError
 
@@ -54,10 +54,10 @@ class CutLayout(NamedTuple):
     length: float
 
 
-def whole_gap(outer: float, direction_deg: float, length: float, uncut: float) -> CutLayout:
+def whole_gap(notch: Any, outer: float) -> CutLayout:
     """Return the layout of a gap that leaves nothing of a tube of an outer radius, mm."""
-    gap = slot(direction_deg, (0.0, length), -1.5 * outer, outer)
-    return CutLayout((gap,), length + uncut)
+    gap = slot(notch.direction_deg, (0.0, notch.length), -1.5 * outer, outer)
+    return CutLayout((gap,), notch.length + notch.uncut_length)
 
 
 def slot(

@@ -199,8 +199,11 @@ class Table:
 def csv_table(source: str | os.PathLike[str]) -> Table:
     """Read a table of at least one row, as it stands in a file."""
     path, text = Path(source), read_text(source, "CSV file")
-    separator = _separator(text)
-    reader = csv.reader(text.splitlines(), strict=True, delimiter=separator)
+    lines = text.splitlines()
+    filled = (line for line in lines if line.strip(" ;,") and not line.lstrip().startswith("#"))
+    head = next(filled, "")
+    separator = ";" if ";" in head and "," not in head else ","
+    reader = csv.reader(lines, strict=True, delimiter=separator)
     try:
         table = [
             (reader.line_num, tuple(map(str.strip, row)))
@@ -238,13 +241,6 @@ def csv_table(source: str | os.PathLike[str]) -> Table:
     decimal = "." if separator == "," else _decimal(path, lines, rows)
     entries = dict(zip(header, zip(*rows, strict=True), strict=True))
     return Table(str(source), entries, lines, decimal)
-
-
-def _separator(text: str) -> str:
-    """Return what separates the columns: a semicolon where the header has no comma."""
-    lines = (line for line in text.splitlines() if line.strip(" ;,"))
-    header = next((line for line in lines if not line.lstrip().startswith("#")), "")
-    return ";" if ";" in header and "," not in header else ","
 
 
 def _decimal(path: Path, lines: Sequence[int], rows: Sequence[Sequence[str]]) -> str:

@@ -317,14 +317,6 @@ _SAMPLE = 1024
 """Rows from all over a sweep, from which the scales of its statistics come."""
 
 
-def axis_values(variable: SweepVariable) -> Float[np.ndarray, " k"]:
-    """Return the values of a variable of the grid."""
-    if variable.values is not None:
-        return np.array(variable.values)
-    spaced = np.geomspace if variable.spacing == "log" else np.linspace
-    return spaced(variable.lower, variable.upper, variable.count)  # pyright: ignore
-
-
 def _ends(variable: SweepVariable) -> tuple[float, float]:
     """Return the least and the greatest value of a variable."""
     values = variable.values or (variable.lower, variable.upper)
@@ -364,7 +356,9 @@ def _numbers(
     """Return numbers by name at places of the grid and sampled levels."""
     numbers: dict[str, np.ndarray] = {}
     for variable in plan.grid[::-1]:
-        values = axis_values(variable)
+        spaced = np.geomspace if variable.spacing == "log" else np.linspace
+        values: Any = variable.values or spaced(variable.lower, variable.upper, variable.count)  # pyright: ignore
+        values = np.array(values)
         places, place = np.divmod(places, len(values))
         numbers[variable.value] = values[place]
     for variable, level in zip(plan.sampled, levels.T, strict=False):

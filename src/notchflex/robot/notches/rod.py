@@ -75,7 +75,7 @@ class RodGap(Notch):
 
     def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
         """Return the whole gap, in which only the backbone is left."""
-        return whole_gap(tube.outer_radius, self.direction_deg, self.length, self.uncut_length)
+        return whole_gap(self, tube.outer_radius)
 
     def tendon_problems(self, tendon: Tendon) -> Problems:
         """Find a tendon on an arc of the wall, which is not there."""

@@ -103,7 +103,7 @@ class TableNotch(Notch):
 
     def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
         """Return the whole gap: what fills it is not known."""
-        return whole_gap(tube.outer_radius, self.direction_deg, self.length, self.uncut_length)
+        return whole_gap(self, tube.outer_radius)
 
     @property
     def stays_in_plane(self) -> bool:
