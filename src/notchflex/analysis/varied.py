@@ -103,7 +103,18 @@ def _errors(
         if known_box and (known_box[0] <= low).all() and (high <= known_box[1]).all():
             return
         for box in ((low - wider, high + wider), (low, high)):
-            if _corners_are_valid(robot, names, cliques, np.array(box)):
+            ends = np.array(box)
+            corners = (
+                (list(clique), corner)  # of numbers that belong together
+                for clique in cliques
+                for corner in itertools.product(*ends[:, list(clique)].T)
+            )
+            for clique, corner in corners:
+                tried = ends.mean(axis=0)
+                tried[clique] = corner
+                if _error(robot, names, tried) is not None:
+                    break
+            else:
                 known_box[:] = box
                 return
         spread = np.nan_to_num((high - low) / np.ptp(table, axis=0))
@@ -120,22 +131,6 @@ def _errors(
 def _known_box(robot: Robot, names: tuple[str, ...]) -> list[np.ndarray]:
     """Return the ends of the last box of numbers that was found valid; none at first."""
     return []
-
-
-def _corners_are_valid(
-    robot: Robot,
-    names: tuple[str, ...],
-    cliques: tuple[tuple[int, ...], ...],
-    ends: Float[np.ndarray, "2 d"],
-) -> bool:
-    """Return whether all corners of a box make a valid robot, of numbers that belong together."""
-    for clique in cliques:
-        for corner in itertools.product(*ends[:, list(clique)].T):
-            numbers = ends.mean(axis=0)
-            numbers[list(clique)] = corner
-            if _error(robot, names, numbers) is not None:
-                return False
-    return True
 
 
 def _error(

@@ -239,7 +239,12 @@ def _step(path: EquilibriumPath, index: int, external: list[dict[str, Any]]) -> 
             *outer, last = quantity.key.split(".")
             for key in outer:
                 holder = holder.setdefault(key, {})
-            holder[last] = _value(path, quantity, index)
+            value = getattr(path, quantity.name)[index]
+            if quantity.per == ("tendon", "span"):
+                value = [row[: spans_of(path, tendon)] for tendon, row in enumerate(value)]
+            elif quantity.scale != 1.0:
+                value = np.asarray(value) * quantity.scale
+            holder[last] = value.item() if isinstance(value, np.generic) else value
     if external:
         step.setdefault("load", {}).update(external[index])
     step["contacts"] = [_contacts(path, tendon, index) for tendon in range(path.tension.shape[1])]
@@ -261,15 +266,6 @@ def _with_units(values: dict[str, Any]) -> dict[str, Any]:
         )
         for name, value in values.items()
     }
-
-
-def _value(path: EquilibriumPath, quantity: Quantity, index: int) -> Any:
-    value = getattr(path, quantity.name)[index]
-    if quantity.per == ("tendon", "span"):
-        return [row[: spans_of(path, tendon)] for tendon, row in enumerate(value)]
-    if quantity.scale != 1.0:
-        return np.asarray(value) * quantity.scale
-    return value.item() if isinstance(value, np.generic) else value
 
 
 def _contacts(path: EquilibriumPath, tendon: int, index: int) -> list[dict[str, Any]]:
