@@ -30,6 +30,7 @@ from notchflex.analysis.outputs import (
     LOADS,
     OUTPUTS,
     WORKS,
+    Arrays,
     UnknownOutputError,
     check_outputs,
     follow_row,
@@ -48,6 +49,9 @@ from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.compiled import Packed, number_of_cores, on_cores
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import PytreeLayout
+
+Rows = Int[np.ndarray, " k"]
+"""Numbers of some rows."""
 
 # Largest number of rows of a piece, by the number of rows.
 _PIECE_SIZES = {0: 64, 512: 256, 8192: 2048}
@@ -317,7 +321,7 @@ def _rows(
     sizes = {name: len(column) for name, column in columns.items()}
     count, places = _places(sizes, product)
 
-    def distinct(names: list[str]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    def distinct(names: list[str]) -> tuple[np.ndarray, Arrays]:
         """Return which combination of some names each row has, and the numbers of each."""
         axes = {name: sizes[name] for name in names}
         number, combinations = _places(axes, product)
@@ -359,7 +363,7 @@ def _numbers(name: str, values: ArrayLike) -> np.ndarray:
     return numbers
 
 
-def _places(sizes: Mapping[str, int], product: bool) -> tuple[int, dict[str, np.ndarray]]:
+def _places(sizes: Mapping[str, int], product: bool) -> tuple[int, Arrays]:
     """Return the number of rows, and of everything that varies its place in each row."""
     if product:
         shape = tuple(sizes.values())
@@ -409,7 +413,7 @@ class LoadRows:
         """Return the number of paths."""
         return len(self.load) // self.steps
 
-    def steps_of(self, paths: Int[np.ndarray, " k"]) -> Int[np.ndarray, "k steps"]:
+    def steps_of(self, paths: Rows) -> Int[np.ndarray, "k steps"]:
         """Return the steps of some paths."""
         return paths[:, None] * self.steps + np.arange(self.steps)
 
@@ -495,16 +499,14 @@ class BatchRows:
             rows = np.concatenate(singly)
         yield from self.one_by_one(rows)
 
-    def _by_kind(
-        self, robot: Robot, rows: Int[np.ndarray, " k"]
-    ) -> Iterator[tuple[int, Int[np.ndarray, " m"]]]:
+    def _by_kind(self, robot: Robot, rows: Rows) -> Iterator[tuple[int, Int[np.ndarray, " m"]]]:
         """Yield what acts, and rows where it does: no row changes the modes of another."""
         loads, steps = self.loads, self.loads.steps_of(self.path_of[rows])
         kinds = np.bitwise_or.reduce(acting(loads.load, robot, steps, loads.tip), axis=1)
         for kind in np.unique(kinds).tolist():
             yield kind, rows[kinds == kind]
 
-    def one_by_one(self, rows: Int[np.ndarray, " k"]) -> Iterator[BatchTable]:
+    def one_by_one(self, rows: Rows) -> Iterator[BatchTable]:
         """Yield rows whose robots are assembled in Python, by the structures of their chains."""
         groups: dict[Any, tuple[list[np.ndarray], dict[int, PreparedChain]]] = {}
         rows = rows[np.argsort(self.robot_of[rows], kind="stable")]
@@ -524,9 +526,9 @@ class BatchRows:
         threads: int,
         tables: Iterable[BatchTable],
         progress: Callable[[int, int], None] | None = None,
-    ) -> dict[str, np.ndarray]:
+    ) -> Arrays:
         """Solve the rows of tables, on several cores."""
-        arrays: dict[str, np.ndarray] = {}
+        arrays: Arrays = {}
         count, done = len(self.robot_of), int((~self.valid).sum())
         work = [(table, rows) for table in tables for rows in table.pieces(threads)]
         solving = on_cores(lambda task: task[0].run(task[1]), work, threads)
@@ -555,7 +557,7 @@ class BatchTable:
     """Rows of a batch that run through one program."""
 
     batch: BatchRows
-    rows: Int[np.ndarray, " k"]  # their numbers, ascending
+    rows: Rows  # their numbers, ascending
     chains: Chains
     kind: int  # what acts, as bits; see `acting`
 
@@ -567,7 +569,7 @@ class BatchTable:
         size = -(-count // (rounds * cores * WIDTH)) * WIDTH
         return (self.rows[start : start + size] for start in range(0, count, size))
 
-    def run(self, rows: Int[np.ndarray, " m"]) -> dict[str, np.ndarray]:
+    def run(self, rows: Int[np.ndarray, " m"]) -> Arrays:
         """Solve a piece of the rows: quantities in the world, NaN where they are not known."""
         batch = self.batch
         outputs, alike = self.solved(rows)
@@ -578,14 +580,12 @@ class BatchTable:
                 outputs[name][~alike] = values
         return outputs
 
-    def solved(
-        self, rows: Int[np.ndarray, " k"]
-    ) -> tuple[dict[str, np.ndarray], Bool[np.ndarray, " k"]]:
+    def solved(self, rows: Rows) -> tuple[Arrays, Bool[np.ndarray, " k"]]:
         """Solve some rows: quantities as `run` returns them, and which rows are right."""
         names, turn = self.batch.outputs, self.batch.loads.load.base_to_world
         needed = (source for name in names for source in WORKS.get(name, (name,)))
         followed = self.followed(rows, (*dict.fromkeys(needed),))
-        outputs: dict[str, np.ndarray] = {}
+        outputs: Arrays = {}
         for name in sorted(names):
             if name not in WORKS:
                 outputs[name] = followed.outputs[name]
@@ -604,7 +604,7 @@ class BatchTable:
                     outputs[name][failed] = np.nan
         return outputs, followed.alike
 
-    def followed(self, rows: Int[np.ndarray, " k"], names: tuple[str, ...]) -> FollowedRows:
+    def followed(self, rows: Rows, names: tuple[str, ...]) -> FollowedRows:
         """Follow the paths of some rows; report quantities in the frame of the base."""
         batch = self.batch
         chains, alike = self.chains.packed(batch.robot_of[rows])
@@ -629,4 +629,4 @@ class FollowedRows(NamedTuple):
     alike: Bool[np.ndarray, " k"]  # which of the chains are right
     commands: Float[np.ndarray, "k s command"]  # packed loads
     layout: PytreeLayout  # of one load
-    outputs: dict[str, np.ndarray]
+    outputs: Arrays

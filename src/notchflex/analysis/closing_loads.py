@@ -40,7 +40,16 @@ from notchflex.solver.programs.compiled import number_of_cores
 from notchflex.solver.programs.prepare import PreparedChain, prepare
 from notchflex.solver.programs.run import run, solve_contacts
 
-Overlap = Callable[[Float[np.ndarray, " m"], Bool[np.ndarray, " m"]], Float[np.ndarray, " m"]]
+PerNotch = Float[np.ndarray, " n"]
+"""A number of every notch."""
+
+Which = Bool[np.ndarray, " m"]
+"""Which of the notches that are searched."""
+
+Searched = Float[np.ndarray, " m"]
+"""Tensions or overlaps, one of each notch that is searched."""
+
+Overlap = Callable[[Searched, Which], Searched]
 """From one tension per notch, and which notches are asked for, to their overlaps (mm).
 
 NaN where the solve did not converge. What it gives of the other notches is not read.
@@ -75,8 +84,8 @@ _ROUNDS = 200
 
 
 def closing_tensions(
-    overlap: Overlap, guess: Float[np.ndarray, " m"], precision: float = PRECISION
-) -> tuple[Float[np.ndarray, " m"], np.ndarray]:
+    overlap: Overlap, guess: Searched, precision: float = PRECISION
+) -> tuple[Searched, np.ndarray]:
     """Find the tension that closes each notch, N, NaN where none was found; and its status."""
     low, high, failed = _bracket(overlap, guess)
     bracketed = np.isfinite(high)
@@ -85,16 +94,14 @@ def closing_tensions(
     return np.where(closes, tension, np.nan), statuses(closes, ~bracketed & ~failed)
 
 
-def statuses(closes: Bool[np.ndarray, " m"], never: Bool[np.ndarray, " m"]) -> np.ndarray:
+def statuses(closes: Which, never: Which) -> np.ndarray:
     """Return a `ClosingStatus` for every notch: where neither holds, it was not found."""
     status = np.full(len(closes), ClosingStatus.NOT_FOUND, dtype=object)
     status[closes], status[never] = ClosingStatus.CLOSES, ClosingStatus.NEVER
     return status
 
 
-def _bracket(
-    overlap: Overlap, guess: Float[np.ndarray, " m"]
-) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
+def _bracket(overlap: Overlap, guess: Searched) -> tuple[Searched, Searched, Which]:
     """A tension that leaves each notch open, one that closes it (NaN: none), and failures met."""
     low, high = np.zeros_like(guess), np.full_like(guess, np.nan)
     failing = np.full_like(guess, np.nan)  # smallest tension above `low` that failed
@@ -116,10 +123,10 @@ def _bracket(
 
 def find_roots(
     overlap: Overlap,
-    low: Float[np.ndarray, " m"],
-    high: Float[np.ndarray, " m"],
+    low: Searched,
+    high: Searched,
     precision: float = PRECISION,
-) -> tuple[Float[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
+) -> tuple[Searched, Which]:
     """Find roots by false position, bisecting where that stalls, and whether each is precise."""
     # `low` leaves a notch open, `high` closes it; both are the same for one that is not searched.
     # After a failed solve the next trials are elsewhere in the bracket, ever closer to its low end.
@@ -183,12 +190,12 @@ class Closing(Displayed):
     """
 
     robot: Robot
-    angle: Float[np.ndarray, " n"]
-    tension: Float[np.ndarray, " n"]
+    angle: PerNotch
+    tension: PerNotch
     status: np.ndarray
     tendon: np.ndarray
-    outer_strain: Float[np.ndarray, " n"]
-    peak_strain: Float[np.ndarray, " n"]
+    outer_strain: PerNotch
+    peak_strain: PerNotch
 
     def jacobian(self, names: str | Sequence[str]) -> dict[str, Float[np.ndarray, "n k"]]:
         """Differentiate closing tensions and angles by numbers of the robot.
@@ -332,9 +339,9 @@ def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
 def _tensions(
     ready: PreparedChain,
     tendon: np.ndarray,
-    arm: Float[np.ndarray, " n"],
-    closing_angle: Float[np.ndarray, " n"],
-) -> tuple[Float[np.ndarray, " n"], np.ndarray]:
+    arm: PerNotch,
+    closing_angle: PerNotch,
+) -> tuple[PerNotch, np.ndarray]:
     """Find the base tension that closes every notch against its spine, and its status."""
     chain = ready.chain
     tension = np.full(chain.flexures, np.nan)
@@ -346,7 +353,7 @@ def _tensions(
     # As many rows as notches, whichever are searched: one compiled program.
     searched, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
 
-    def overlap(tension: Float[np.ndarray, " m"], _: Bool[np.ndarray, " m"]) -> np.ndarray:
+    def overlap(tension: Searched, _: Which) -> np.ndarray:
         value = np.zeros((chain.flexures, chain.tendons))
         value[rows, tendon[searched]] = np.resize(tension, chain.flexures)
         force, gap, converged = solve_contacts(
@@ -362,7 +369,7 @@ def _tensions(
 
 def _by_one_tendon(
     ready: PreparedChain, tendon: int, notches: np.ndarray
-) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], np.ndarray]:
+) -> tuple[Searched, Searched, np.ndarray]:
     """Find them for some notches, pulling one tendon."""
     free, _ = _pull(ready, tendon, np.zeros(1))
     reach = -free[0, notches]  # the gap at rest: an edge so far from closing
@@ -374,7 +381,7 @@ def _by_one_tendon(
     closes = touching.any(axis=0)
     after = np.maximum(touching.argmax(axis=0), 1)
 
-    def evaluate(tension: Float[np.ndarray, " m"]) -> tuple[np.ndarray, np.ndarray]:
+    def evaluate(tension: Searched) -> tuple[np.ndarray, np.ndarray]:
         """Compute overlap and angle of every notch, each at its own tension, on one path."""
         order = np.argsort(tension)
         back = np.argsort(order)

@@ -18,7 +18,7 @@ from jaxtyping import Float
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.forward_model import nearby, prepared_like, slope
-from notchflex.analysis.outputs import LOADS, OUTPUTS, check_outputs
+from notchflex.analysis.outputs import LOADS, OUTPUTS, Arrays, check_outputs
 from notchflex.analysis.tangent import Change, Gradient, PathTangents, path_gradient
 from notchflex.errors import InputError
 from notchflex.loads.command import Command, load_slopes, make_commands
@@ -44,7 +44,7 @@ _ADJOINT = 4
 
 def jacobian(
     path: EquilibriumPath, names: str | Sequence[str], outputs: str | Sequence[str]
-) -> dict[str, np.ndarray]:
+) -> Arrays:
     """Differentiate quantities of a path; see `EquilibriumPath.jacobian`."""
     names, outputs = _checked(path, names), check_outputs(outputs, SLOPING)
     by = derivatives(path, changes(path, names), outputs)
@@ -54,7 +54,7 @@ def jacobian(
 def gradient(path: EquilibriumPath, weights: Mapping[str, Any]) -> PathGradient:
     """Differentiate a weighted sum of quantities of a path; see `EquilibriumPath.gradient`."""
     _checked(path, ())
-    arrays: dict[str, np.ndarray] = {}
+    arrays: Arrays = {}
     for name in check_outputs(tuple(weights), SLOPING):
         shape = np.shape(path.quantity(name))
         try:
@@ -121,7 +121,7 @@ def _checked(path: EquilibriumPath, names: str | Sequence[str]) -> tuple[str, ..
     return names
 
 
-def start_of(robot: Robot, load: LoadPath, names: Sequence[str]) -> dict[str, np.ndarray]:
+def start_of(robot: Robot, load: LoadPath, names: Sequence[str]) -> Arrays:
     """Return the present values of numbers and loads by name; raise for one that cannot vary."""
     for warning in load.replaced(names):
         raise InputError.CONFLICT(str(warning))
@@ -277,9 +277,7 @@ def _moved(robot: Robot, name: str, names: Iterable[str]) -> Callable[[float], R
     return lambda value: robot.with_values({name: value, **unchanged})
 
 
-def derivatives(
-    path: EquilibriumPath, along: Sequence[Change], outputs: tuple[str, ...]
-) -> dict[str, np.ndarray]:
+def derivatives(path: EquilibriumPath, along: Sequence[Change], outputs: tuple[str, ...]) -> Arrays:
     """Differentiate a solved path along changes of what it is computed from.
 
     Args:
