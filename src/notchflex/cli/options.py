@@ -22,6 +22,7 @@ from notchflex.support import (
     BROWSER,
     PAPER,
     STANDARD_OUTPUT,
+    AnyPath,
     BodyForceOption,
     TendonCommand,
     Vector,
@@ -462,7 +463,7 @@ class InPieces(Work):
 
     folder: Annotated[str | None, Parameter(metavar="DIR")] = None
 
-    def chosen(self, kind: str, inputs: Iterable[str | os.PathLike[str]]) -> PieceFolder | None:
+    def chosen(self, kind: str, inputs: Iterable[AnyPath]) -> PieceFolder | None:
         """Return the folder, None if none is given; nothing is written.
 
         Args:

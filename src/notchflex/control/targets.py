@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, cast
@@ -16,6 +15,7 @@ from notchflex.support import (
     AXES,
     DEGREES,
     REGISTERED,
+    AnyPath,
     axis_sizes,
     check_is_robot,
     check_number,
@@ -209,7 +209,7 @@ def _unit(directions: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
 
 
 def read_targets(
-    source: str | os.PathLike[str], robot: Robot, columns: Mapping[str, str] | None = None
+    source: AnyPath, robot: Robot, columns: Mapping[str, str] | None = None
 ) -> Targets:
     r"""Read targets from a CSV file.
 

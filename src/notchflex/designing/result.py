@@ -22,6 +22,7 @@ from notchflex.designing.solver import distances
 from notchflex.designing.specification import DesignSpec
 from notchflex.search.slsqp import TOLERANCE
 from notchflex.support import (
+    AnyPath,
     Displayed,
     Summary,
     check_folder,
@@ -59,9 +60,7 @@ class SavedInFolder(Displayed):
         """By name of a file what writes it."""
         raise NotImplementedError
 
-    def save(
-        self, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
-    ) -> tuple[Path, ...]:
+    def save(self, folder: AnyPath, *, inputs: Iterable[str | Path] = ()) -> tuple[Path, ...]:
         """Write robot files, tables, documents and pictures into a folder.
 
         Args:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -15,7 +14,7 @@ from notchflex.fit.objective import FitObjective, LeastSquares, noise_left
 from notchflex.fit.residuals import Samples
 from notchflex.fit.search import FitProblem, Minimum, Progress, search
 from notchflex.pieces import PieceFolder
-from notchflex.support import short_repr
+from notchflex.support import AnyPath, short_repr
 
 # How often noise and constants are estimated from each other.
 _ROUNDS = 10
@@ -35,7 +34,7 @@ def calibrate(
     intervals: bool = True,
     settings: Settings | None = None,
     progress: Progress | None = None,
-    folder: PieceFolder | str | os.PathLike[str] | None = None,
+    folder: PieceFolder | AnyPath | None = None,
 ) -> Calibration:
     """Fit constants of robots to measurements.
 
@@ -152,7 +151,7 @@ def fitted(
     seed: int,
     intervals: bool,
     progress: Progress | None = None,
-    folder: PieceFolder | str | os.PathLike[str] | None = None,
+    folder: PieceFolder | AnyPath | None = None,
 ) -> Calibration:
     """Fit a problem, its noise if unknown, and intervals; arguments as for `calibrate`.
 

@@ -7,7 +7,6 @@ of an interval.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -24,6 +23,7 @@ from notchflex.fit.next_measurement import NextMeasurement
 from notchflex.fit.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
 from notchflex.fit.posterior import Posterior
 from notchflex.support import (
+    AnyPath,
     check_folder,
     plain,
     robot_text,
@@ -315,7 +315,7 @@ def summary(fit: Calibration) -> str:
 
 
 def write_fitted(
-    found: Calibration, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
+    found: Calibration, folder: AnyPath, *, inputs: Iterable[str | Path] = ()
 ) -> tuple[Path, ...]:
     """Write every fitted robot as a robot file, named after its label.
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from notchflex._quantity import Quantity
+from notchflex._replacing import AnyPath
 from notchflex.errors import InputError
 from notchflex.results.io import read_columns
 from notchflex.results.quantities import AXES, QUANTITIES
@@ -84,9 +85,7 @@ _PLAIN = re.compile(r"photograph|pull|trial|from_rest|tip_direction_[xyz]")
 _WORDS = {word: column for column, words in _QUANTITIES.items() for word in words}
 
 
-def read_data_table(
-    source: str | os.PathLike[str], columns: Mapping[str, str] | None = None
-) -> Table:
+def read_data_table(source: AnyPath, columns: Mapping[str, str] | None = None) -> Table:
     """Read a table whose headers may be in other words or units.
 
     Args:
@@ -171,7 +170,7 @@ Asked = TypeVar("Asked")
 
 
 def read_specification(
-    path: str | os.PathLike[str], kind: str, make: Callable[[Mapping[str, Any]], Asked]
+    path: AnyPath, kind: str, make: Callable[[Mapping[str, Any]], Asked]
 ) -> Asked:
     """Read a file and make what it asks.
 

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from notchflex._replacing import AnyPath
 from notchflex.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ _PART, _WRITER_COMES = 2**16, 3.0
 """Bytes that are read at once, and how long a pipe waits for its writer, s."""
 
 
-def bounded_bytes(path: str | os.PathLike[str], most: int = _LARGEST) -> bytes:
+def bounded_bytes(path: AnyPath, most: int = _LARGEST) -> bytes:
     """Read a file of at most so many bytes; a pipe without a writer raises `OSError` too."""
     with open(path, "rb", buffering=0, opener=_at_once) as file:
         pipe = stat.S_ISFIFO(os.fstat(file.fileno()).st_mode)
@@ -59,7 +60,7 @@ def _at_once(path: str, flags: int) -> int:
 
 
 def read_text(
-    source: str | os.PathLike[str],
+    source: AnyPath,
     kind: str,
     shown: str | None = None,
     error_class: type[InputError] = InputError,
@@ -196,7 +197,7 @@ class Table:
         return f"the columns are {', '.join(self.written.get(one, one) for one in self.header)}"
 
 
-def csv_table(source: str | os.PathLike[str]) -> Table:
+def csv_table(source: AnyPath) -> Table:
     """Read a table of at least one row, as it stands in a file."""
     path, text = Path(source), read_text(source, "CSV file")
     lines = text.splitlines()

@@ -5,7 +5,6 @@ What a row gives depends on the plan alone: not on the process, on the rows befo
 
 from __future__ import annotations
 
-import os
 import shutil
 import time
 from collections.abc import Mapping, Sequence
@@ -50,6 +49,7 @@ from notchflex.specification import (
     with_robot,
 )
 from notchflex.support import (
+    AnyPath,
     Displayed,
     Summary,
     from_table,
@@ -272,7 +272,7 @@ class Sweep(Displayed):
         return Summary(title, rows, ".lazy() is a frame of polars, .to_xarray() a data set")
 
 
-def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
+def read_sweep(directory: AnyPath) -> Sweep:
     """Read a sweep, which may be unfinished.
 
     Args:
@@ -508,8 +508,8 @@ class SweepTask(PieceTask):
 
 
 def sweep(
-    plan: SweepPlan | Mapping[str, Any] | str | os.PathLike[str],
-    directory: str | os.PathLike[str],
+    plan: SweepPlan | Mapping[str, Any] | AnyPath,
+    directory: AnyPath,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -600,7 +600,7 @@ class Estimate(NamedTuple):
     unsolved: int
 
 
-def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = None) -> Estimate:
+def estimate(plan: SweepPlan | AnyPath, *, workers: int | None = None) -> Estimate:
     """Solve the first piece of a sweep, and estimate its whole time and size; nothing is written.
 
     Args:

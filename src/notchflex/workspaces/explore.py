@@ -8,7 +8,6 @@ pulled at a time: what more would add is pressed together, not moved.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -47,6 +46,7 @@ from notchflex.specification import (
     whole,
 )
 from notchflex.support import (
+    AnyPath,
     ExternalLoad,
     check_is_robot,
     check_number,
@@ -442,7 +442,7 @@ def workspace(
     seed: int = 0,
     cores: int | None = None,
     progress: Progress | None = None,
-    folder: PieceFolder | str | os.PathLike[str] | None = None,
+    folder: PieceFolder | AnyPath | None = None,
 ) -> Workspace:
     """Explore where the tip of a robot can go, during loading and unloading.
 
