@@ -430,32 +430,27 @@ class LoadRows:
         if not values and np.array_equal(which, np.arange(len(self))):
             return self
         load = self.load[self.steps_of(which).ravel()]
-        tables = {
-            name: self._table(name, numbers, load.numbers(name)) for name, numbers in values.items()
-        }
+        tables: Arrays = {}
+        for name, numbers in values.items():
+            present = load.numbers(name)
+            shape = (len(numbers), self.steps, present.shape[1])
+            steps = numbers if numbers.ndim > 2 else numbers.reshape(len(numbers), 1, -1)
+            try:
+                if name in TIP and steps.shape[2] != 3:
+                    raise ValueError
+                tables[name] = np.broadcast_to(steps, shape).reshape(present.shape)
+            except ValueError:
+                last = "3" if name in TIP else f"{shape[2]} tendons or 1"
+                raise InputError.WRONG_SHAPE(
+                    f"`{name}` needs rows by {last}, or rows by {self.steps} steps by {last}; "
+                    f"got numbers of shape {numbers.shape}"
+                ) from None
         load = load.commanding({name: tables[name] for name in TENDONS if name in tables})
         if not any(name in TIP for name in tables):
             return replace(self, load=load)
         tip = np.hstack([tables[name] if name in tables else load.numbers(name) for name in TIP])
         load = load.loaded(tip_force=NO_VECTOR, tip_moment=NO_VECTOR)
         return replace(self, load=load, tip=tip)
-
-    def _table(
-        self, name: str, values: np.ndarray, present: Float[np.ndarray, "s k"]
-    ) -> Float[np.ndarray, "s k"]:
-        """Return numbers of paths in every step."""
-        shape = (len(values), self.steps, present.shape[1])
-        steps = values if values.ndim > 2 else values.reshape(len(values), 1, -1)
-        try:
-            if name in TIP and steps.shape[2] != 3:
-                raise ValueError
-            return np.broadcast_to(steps, shape).reshape(present.shape)
-        except ValueError:
-            last = "3" if name in TIP else f"{shape[2]} tendons or 1"
-            raise InputError.WRONG_SHAPE(
-                f"`{name}` needs rows by {last}, or rows by {self.steps} steps by {last}; "
-                f"got numbers of shape {values.shape}"
-            ) from None
 
 
 @dataclass(frozen=True, eq=False)

@@ -278,18 +278,16 @@ class Outputs:
             elif name == "plot":
                 text = f"drawing {target}"
                 with terminal.progress(text, compiles=False) as progress:
-                    draw = writers.get(name, partial(_draw, title))
-                    draw(result, target, partial(progress, text))
+                    if name in writers:
+                        writers[name](result, target, partial(progress, text))
+                    else:
+                        from notchflex.plotting import picture
+
+                        picture(result, title=title).save(target)
             elif name in writers:
                 writers[name](result, target)
         if show and self.prints_tables:
             show(result)
-
-
-def _draw(title: str | None, result: Any, target: str, _: object) -> None:
-    from notchflex.plotting import picture
-
-    picture(result, title=title).save(target)
 
 
 def as_csv(columns: Callable[[Any], Mapping[str, Any]]) -> Callable[[Any, str], None]:

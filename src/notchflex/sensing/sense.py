@@ -14,7 +14,7 @@ from notchflex.search.least_squares import SearchPoint
 from notchflex.sensing.bounds import Bounds, bounds
 from notchflex.sensing.history import estimate, own_readings, state_after, with_noise
 from notchflex.sensing.model import SensingModel, unknown_force
-from notchflex.sensing.readings import Readings, SensorNoise, merged, readings_of
+from notchflex.sensing.readings import SensorNoise, merged, readings_of
 from notchflex.sensing.sensed import LeftOpen, SensedForce
 from notchflex.support import ExternalLoad, check_is_robot, check_number
 
@@ -86,7 +86,15 @@ def sense(
     given = readings_of(robot, tensions, strokes, tip, angles, sensors)
     readings, group = merged(given)
     unknown = unknown_force(robot, components, place, known)
-    model = SensingModel(robot, readings, unknown, _largest(robot, readings, largest))
+    if largest is None:
+        lever = max(tendon.radius for tendon in robot.tendon)
+        tension = float(np.nanmax(readings.tension, initial=0.0))
+        far = _RANGE * max(tension, 1.0) * lever / robot.geometry.length
+    elif not 0.0 < (far := check_number(largest, "largest", "a force in N")) < np.inf:
+        raise InputError.OUT_OF_RANGE(
+            f"largest is the largest force looked for, above 0 N; got {far:g}"
+        )
+    model = SensingModel(robot, readings, unknown, far)
     places: dict[int | None, float] = {}
     if place == "search":
         model, places = _best_place(model, progress)
@@ -96,20 +104,6 @@ def sense(
     every = [reading for members in own for reading in members]
     left_open = [LeftOpen.of(model, reading, ends, LEVEL) for reading in every]
     return _result(model, history.best, ends, left_open, places, group)
-
-
-def _largest(robot: Robot, readings: Readings, largest: float | None) -> float:
-    """Return the range of the search, N."""
-    if largest is not None:
-        value = check_number(largest, "largest", "a force in N")
-        if not 0.0 < value < np.inf:
-            raise InputError.OUT_OF_RANGE(
-                f"largest is the largest force looked for, above 0 N; got {value:g}"
-            )
-        return value
-    lever = max(tendon.radius for tendon in robot.tendon)
-    tension = float(np.nanmax(readings.tension, initial=0.0))
-    return _RANGE * max(tension, 1.0) * lever / robot.geometry.length
 
 
 def _stage(progress: Stage | None, name: str) -> Callable[[int, int], None] | None:
