@@ -195,11 +195,11 @@ def load_columns(
 
 
 class BodyForceOption(NamedTuple):
-    """One `--body-force`: number of the body, force [N], and its point [mm] if given."""
+    """One `--body-force`: number of the body, force [N], and its point [mm]."""
 
     body: int
     force: Vector
-    point: Vector | None
+    point: Vector
 
 
 def read_body_force(text: str) -> BodyForceOption:
@@ -207,6 +207,6 @@ def read_body_force(text: str) -> BodyForceOption:
     match = re.fullmatch(r"\s*(\d{1,9})\s*:([^@]*)(?:@(.*))?", text, re.ASCII | re.DOTALL)
     if match is None:
         raise InputError.BAD_SYNTAX(f"give {_BODY}.")
-    body, force, point = match.groups()
-    where = None if point is None else parse_vector("coordinates in mm")(point)
+    body, force, point = match.groups("0,0,0")
+    where = parse_vector("coordinates in mm")(point)
     return BodyForceOption(int(body), parse_vector("forces in N")(force), where)

@@ -413,8 +413,7 @@ class ExternalLoads:
         given = {name: value for name, value in vars(self).items() if value not in (None, ())}
         if forces := given.pop("body_force", ()):
             given["body_forces"] = [
-                BodyForce(body, force, point=point or (0.0, 0.0, 0.0), following=self.following)
-                for body, force, point in forces
+                BodyForce(**force._asdict(), following=self.following) for force in forces
             ]
         if self.temperature and len(self.temperature) == 1:
             (given["temperature"],) = self.temperature

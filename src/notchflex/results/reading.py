@@ -223,7 +223,7 @@ _PATTERNS = {
 }
 
 
-def read_table(file: str | Path) -> dict[str, NDArray[Any]]:
+def read_table(file: AnyPath) -> dict[str, NDArray[Any]]:
     """Read a table that was written of a path, as its quantities in mm, N and rad.
 
     A table holds every step as it was printed, so angles come back to the last digit or two. What

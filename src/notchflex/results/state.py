@@ -7,14 +7,13 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from operator import attrgetter
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, overload
 
 import jax.tree_util as tree_util
 import numpy as np
 from jaxtyping import Float, Int
 
-from notchflex._replacing import replacing
+from notchflex._replacing import AnyPath, replacing
 from notchflex._summary import MOST, Displayed, Summary, course, short, vector
 from notchflex._values import ByValue
 from notchflex.errors import ConvergenceError, InputError
@@ -133,7 +132,7 @@ class State(ByValue, Displayed):
     def _value(self) -> Any:
         return (self.robot, self.arrays, self.level, self.loaded, self.refinement)
 
-    def save(self, path: str | FilePath) -> None:
+    def save(self, path: AnyPath) -> None:
         """Write the state to a JSON file.
 
         Args:
@@ -163,7 +162,7 @@ class State(ByValue, Displayed):
         return bool(np.any(self.arrays.get(f"{_LOADS}.following", 0.0)))
 
     @classmethod
-    def load(cls, path: str | FilePath) -> State:
+    def load(cls, path: AnyPath) -> State:
         """Read a state back; it is fitted to a robot when it is continued from.
 
         Args:
@@ -262,7 +261,7 @@ def _in_space(solved: SolverState, chain: Chain, *, reduce: bool = False) -> Sol
     return solved._replace(applied=in_space(solved.applied, chain.frame, reduce=reduce))
 
 
-def _damaged(source: str | FilePath, what: str) -> InputError:
+def _damaged(source: AnyPath, what: str) -> InputError:
     return InputError.FILE_DAMAGED(
         f"the state file {source} is damaged: {what}; save the state again"
     )

@@ -19,6 +19,7 @@ import numpy as np
 
 from notchflex import __version__
 from notchflex._quantity import Quantity
+from notchflex._replacing import AnyPath
 from notchflex.results.quantities import (
     AXES,
     CONTACT_STATES,
@@ -33,8 +34,6 @@ from notchflex.robot import Robot
 from notchflex.robot.robot import to_table
 
 if TYPE_CHECKING:
-    from pathlib import Path as FilePath
-
     from notchflex.results.path import EquilibriumPath
 
 
@@ -48,7 +47,7 @@ def path_columns(path: EquilibriumPath) -> dict[str, Sequence[Any]]:
 
 
 def write_path_csv(
-    target: str | FilePath, path: EquilibriumPath, more: Mapping[str, Sequence[Any]] | None = None
+    target: AnyPath, path: EquilibriumPath, more: Mapping[str, Sequence[Any]] | None = None
 ) -> None:
     """Write a path as CSV to a file, whole or not at all, or to standard output for `-`.
 
@@ -63,7 +62,7 @@ def write_path_csv(
     write_columns(target, {**path_columns(path), **(more or {})})
 
 
-def write_columns(target: str | FilePath, columns: Mapping[str, Iterable[Any]]) -> None:
+def write_columns(target: AnyPath, columns: Mapping[str, Iterable[Any]]) -> None:
     """Write columns as CSV, as `write_csv` does its rows.
 
     Args:
@@ -76,7 +75,7 @@ def write_columns(target: str | FilePath, columns: Mapping[str, Iterable[Any]]) 
     write_csv(target, list(columns), zip(*columns.values(), strict=True))
 
 
-def write_csv(target: str | FilePath, header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
+def write_csv(target: AnyPath, header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
     """Write rows as CSV (UTF-8, comma, header first); NaN and None become empty fields.
 
     Args:
@@ -202,7 +201,7 @@ def json_text(document: Any) -> str:
     return json.dumps(plain(document), ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def write_json(target: str | FilePath, document: Any) -> None:
+def write_json(target: AnyPath, document: Any) -> None:
     """Write a document to a file, whole or not at all, or to standard output for `-`.
 
     Raises:
