@@ -27,11 +27,11 @@ from notchflex.loads import LoadPath
 from notchflex.loads.command import tension_commands
 from notchflex.mechanics.chain import Chain, assemble, sites_of
 from notchflex.mechanics.contact import closing_angles, free_angle
-from notchflex.mechanics.flexure import Site, rod_at
+from notchflex.mechanics.flexure import rod_at
 from notchflex.mechanics.material import FibreSection, Law, peak_strain, section_strain
 from notchflex.results.path import EquilibriumPath
 from notchflex.results.quantities import DEGREES, QUANTITIES
-from notchflex.robot import Robot, TableNotch, Tube
+from notchflex.robot import Robot, TableNotch
 from notchflex.robot.kinds import Notch
 from notchflex.robot.part import fields_in, unit_of
 from notchflex.robot.value_names import number_at
@@ -479,10 +479,19 @@ def notch_table(robot: Robot, closing_table: Closing | None = None) -> list[dict
     table = closing(robot) if closing_table is None else closing_table
     arms = moment_arms(assemble(robot, flat=False))
     placed = list(zip(robot.notches, sites_of(robot), strict=True))
-    described = {
-        (notch, site): _description(notch, site, notch.tube or robot.tube)
-        for notch, site in dict.fromkeys(placed)
-    }
+    described: dict[Any, dict[str, Any]] = {}
+    for notch, site in dict.fromkeys(placed):
+        described[notch, site] = values = named_values(notch)
+        if isinstance(notch, TableNotch):  # of no section
+            continue
+        tube = notch.tube or robot.tube
+        rod = rod_at(site, notch, tube)
+        section = rod.section
+        weakest = int(np.argmin(section.second_moment_weak))
+        values["area_mm2"] = float(section.area[weakest])
+        values["second_moment_mm4"] = float(section.second_moment_weak[weakest])
+        if float(rod.has_closure) > 0.0:  # opposite a spine; from the tube axis toward it
+            values["centroid_mm"] = tube.outer_radius - float(section.edge_spine[weakest])
     return [
         {
             "notch": index + 1,
@@ -511,18 +520,3 @@ def named_values(notch: Notch) -> dict[str, Any]:
             values[with_unit] = value
     del values["repeat"]
     return values
-
-
-def _description(notch: Notch, site: Site | None, tube: Tube) -> dict[str, Any]:
-    if isinstance(notch, TableNotch):  # of no section
-        return named_values(notch)
-    rod = rod_at(site, notch, tube)
-    section = rod.section
-    weakest = int(np.argmin(section.second_moment_weak))
-    values: dict[str, Any] = {  # of the weakest section
-        "area_mm2": float(section.area[weakest]),
-        "second_moment_mm4": float(section.second_moment_weak[weakest]),
-    }
-    if float(rod.has_closure) > 0.0:  # opposite a spine; from the tube axis toward it
-        values["centroid_mm"] = tube.outer_radius - float(section.edge_spine[weakest])
-    return named_values(notch) | values

@@ -338,11 +338,7 @@ def robust_search(
         for done in range(0 if interrupted else _ROUNDS):
             if progress is not None:
                 progress("making it robust", done, _ROUNDS)
-            # Every constraint holds by the largest factor of those that it needs.
-            holds: dict[int, Hold] = {}
-            for one, factor in sorted(zip(targets, factors, strict=True), key=lambda pair: pair[1]):
-                holds |= {numbers[k]: Hold(one.wanted or 0.0, factor) for k in one.columns}
-            found = search_on(starts, holds)
+            found = search_on(starts, _holds(targets, factors, numbers))
             if not found:
                 break
             last = min(found, key=lambda design: design.result.merit)
@@ -363,6 +359,16 @@ def robust_search(
         YieldOf(one.title, one.wanted, *best.part(one), designs[0].part(one)[0])
         for one in (of_all, *single)
     )
+
+
+def _holds(
+    targets: Sequence[_Target], factors: Sequence[float], numbers: Sequence[int]
+) -> dict[int, Hold]:
+    """Return how every constraint is to hold: by the largest factor of those that it needs."""
+    holds: dict[int, Hold] = {}
+    for target, factor in sorted(zip(targets, factors, strict=True), key=lambda pair: pair[1]):
+        holds |= {numbers[column]: Hold(target.wanted or 0.0, factor) for column in target.columns}
+    return holds
 
 
 def _corrected(target: _Target, factor: float, design: _Counted) -> float:

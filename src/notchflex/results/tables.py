@@ -246,7 +246,17 @@ def _step(path: EquilibriumPath, index: int, external: list[dict[str, Any]]) -> 
             holder[last] = value.item() if isinstance(value, np.generic) else value
     if external:
         step.setdefault("load", {}).update(external[index])
-    step["contacts"] = [_contacts(path, tendon, index) for tendon in range(path.tension.shape[1])]
+    step["contacts"] = []
+    for tendon in range(path.tension.shape[1]):
+        count = spans_of(path, tendon) - 1
+        columns = {
+            q.key.split(".")[1]: getattr(path, q.name)[index, tendon, :count] * q.scale
+            for q in CONTACTS
+            if holds(path, q)
+        }
+        columns["state"] = [CONTACT_STATES[int(state)] for state in columns["state"]]
+        contacts = [{key: each[number] for key, each in columns.items()} for number in range(count)]
+        step["contacts"].append(contacts)
     return step
 
 
@@ -265,14 +275,3 @@ def _with_units(values: dict[str, Any]) -> dict[str, Any]:
         )
         for name, value in values.items()
     }
-
-
-def _contacts(path: EquilibriumPath, tendon: int, index: int) -> list[dict[str, Any]]:
-    count = spans_of(path, tendon) - 1
-    columns = {
-        q.key.split(".")[1]: getattr(path, q.name)[index, tendon, :count] * q.scale
-        for q in CONTACTS
-        if holds(path, q)
-    }
-    columns["state"] = [CONTACT_STATES[int(state)] for state in columns["state"]]
-    return [{key: column[contact] for key, column in columns.items()} for contact in range(count)]

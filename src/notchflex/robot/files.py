@@ -152,26 +152,23 @@ class Table:
         import numpy as np  # robots without a file are read without it
 
         hint = "; leave the entry empty where there is none" if may_miss and not is_load else ""
-        return np.array(
-            [
-                math.nan if may_miss and not text else self._number(text, column, line, hint)
-                for text, line in zip(self.texts(column), self.lines, strict=True)
-            ]
-        )
-
-    def _number(self, text: str, column: str, line: int, hint: str) -> float:
-        column = self.written.get(column, column)
-        place = f"{self.name}, line {line}: {column} is"
-        try:
-            value = float(text.replace(self.decimal, ".", 1))
-        except ValueError:
-            got = repr(text) if text else "nothing"
-            raise InputError.NOT_A_NUMBER(f"{place} {got}; give a number{hint}.") from None
-        if not math.isfinite(value):
-            raise InputError.NOT_FINITE(f"{place} {text}; give a finite number{hint}.")
-        if abs(value) > LARGEST:
-            raise InputError.OUT_OF_RANGE(f"{place} {text}; give at most {LARGEST:g}.")
-        return value
+        values, written = list[float](), self.written.get(column, column)
+        for text, line in zip(self.texts(column), self.lines, strict=True):
+            if may_miss and not text:
+                values.append(math.nan)
+                continue
+            place = f"{self.name}, line {line}: {written} is"
+            try:
+                value = float(text.replace(self.decimal, ".", 1))
+            except ValueError:
+                got = repr(text) if text else "nothing"
+                raise InputError.NOT_A_NUMBER(f"{place} {got}; give a number{hint}.") from None
+            if not math.isfinite(value):
+                raise InputError.NOT_FINITE(f"{place} {text}; give a finite number{hint}.")
+            if abs(value) > LARGEST:
+                raise InputError.OUT_OF_RANGE(f"{place} {text}; give at most {LARGEST:g}.")
+            values.append(value)
+        return np.array(values)
 
     def place_of(self, row: int) -> str:
         """Return where a row (from 0) stands, as messages begin: file and line."""

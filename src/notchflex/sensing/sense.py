@@ -97,7 +97,18 @@ def sense(
     model = SensingModel(robot, readings, unknown, far)
     places: dict[int | None, float] = {}
     if place == "search":
-        model, places = _best_place(model, progress)
+        bodies = [*range(1, robot.number_of_notches + 1), None]
+        report = _stage(progress, "trying places")
+        for number, body in enumerate(bodies, 1):
+            candidates = estimate(replace(model, unknown=replace(unknown, body=body))).best
+            whole = len(candidates) == len(readings)
+            places[body] = sum(point.merit for point in candidates) if whole else np.inf
+            if report is not None:
+                report(number, len(bodies))
+        # Of places that fit as well the tip is taken: it is where robots touch.
+        least = min(places.values())
+        body = None if places[None] <= least + 1e-6 else min(places, key=lambda one: places[one])
+        model = replace(model, unknown=replace(unknown, body=body))
     history = with_noise(estimate(model, _stage(progress, "finding the force")))
     own = own_readings(history, given, group)
     ends = bounds(history, own, LEVEL, _stage(progress, "finding the interval"))
@@ -108,25 +119,6 @@ def sense(
 
 def _stage(progress: Stage | None, name: str) -> Callable[[int, int], None] | None:
     return None if progress is None else lambda done, count: progress(name, done, count)
-
-
-def _best_place(
-    model: SensingModel, progress: Stage | None
-) -> tuple[SensingModel, dict[int | None, float]]:
-    """Return the model with the force where it fits best, and the misfit of every place."""
-    bodies = [*range(1, model.robot.number_of_notches + 1), None]
-    report = _stage(progress, "trying places")
-    misfits: dict[int | None, float] = {}
-    for number, body in enumerate(bodies, 1):
-        candidates = estimate(replace(model, unknown=replace(model.unknown, body=body))).best
-        whole = len(candidates) == len(model.readings)
-        misfits[body] = sum(point.merit for point in candidates) if whole else np.inf
-        if report is not None:
-            report(number, len(bodies))
-    # Of places that fit as well the tip is taken: it is where robots touch.
-    least = min(misfits.values())
-    body = None if misfits[None] <= least + 1e-6 else min(misfits, key=lambda one: misfits[one])
-    return replace(model, unknown=replace(model.unknown, body=body)), misfits
 
 
 def _result(

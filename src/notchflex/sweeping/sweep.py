@@ -405,15 +405,6 @@ def _middle(plan: SweepPlan, robot: Robot) -> Robot:
         raise type(problem)(message if invalid else str(problem), problem.code) from None
 
 
-def _column_name(criterion: Criterion, has_load: bool) -> str:
-    """Return the name of a column, such as `notch_angle_3_deg_at_pulled_step_2`."""
-    words = [criterion.quantity.name, *entry_names(criterion.quantity.per, criterion.index)]
-    words.append(criterion.quantity.unit.replace(" ", ""))
-    words.append(f"at_{criterion.load}" if has_load else "")
-    words.append(f"step_{criterion.step + 1}" if "step " in criterion.name else "")
-    return "_".join(filter(None, words))
-
-
 @dataclass(frozen=True, eq=False)
 class SweepTask(PieceTask):
     """The robots of a sweep, in pieces.
@@ -451,9 +442,15 @@ class SweepTask(PieceTask):
 
     @cached_property
     def columns(self) -> list[str]:
-        """Names of the columns of the kept numbers."""
-        has_load = len(self.study.paths) > 1
-        return [_column_name(criterion, has_load) for criterion in self.study.criteria]
+        """Names of the columns of the kept numbers: `notch_angle_3_deg_at_pulled_step_2`."""
+        columns, has_load = list[str](), len(self.study.paths) > 1
+        for one in self.study.criteria:
+            words = [one.quantity.name, *entry_names(one.quantity.per, one.index)]
+            words.append(one.quantity.unit.replace(" ", ""))
+            words.append(f"at_{one.load}" if has_load else "")
+            words.append(f"step_{one.step + 1}" if "step " in one.name else "")
+            columns.append("_".join(filter(None, words)))
+        return columns
 
     @cached_property
     def manifest(self) -> Manifest:

@@ -274,8 +274,18 @@ class WorkspaceTask(PieceTask):
             return sobol_points(dimension, self.seed, start, stop, total or self.number)
 
         tension = rays(self.robot, self.largest, _LEVELS, self.pretension, points)
-        if self.limits:
-            tension = tension * self._allowed(tension)[:, None, None]
+        if self.limits:  # the part of each ray that they allow, by a pull in few levels
+            part = np.linspace(0.0, 1.0, _FIRST_LEVELS + 1)
+            peak = tension[:, tension.shape[1] // 2]
+            within = self._solved(part[1:, None] * peak[:, None])[1]
+            last = np.logical_and.accumulate(within, axis=1).sum(axis=1)
+            low, high = part[last], part[np.minimum(last + 1, _FIRST_LEVELS)]
+            for _ in range(_HALVINGS):  # rays as a batch
+                middle = 0.5 * (low + high)
+                steps = np.stack([low, middle], axis=1)[:, :, None] * peak[:, None]
+                fits = self._solved(steps)[1][:, 1]
+                low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+            tension = tension * low[:, None, None]
         names = ["tip_position", "tip_rotation", "peak_strain", "total_angle"]
         outputs, within = self._solved(tension, names)
         # What follows a state beyond a limit has a history that the limit forbids.
@@ -294,20 +304,6 @@ class WorkspaceTask(PieceTask):
         }
         counts = [keeps.sum(), (converged & ~keeps).sum(), (~converged).sum()]
         return {name: values[keeps] for name, values in columns.items()}, np.array(counts)
-
-    def _allowed(self, tension: Float[np.ndarray, "r s t"]) -> Float[np.ndarray, " r"]:
-        """Return the part of each ray that the limits allow, by a pull in few levels."""
-        part = np.linspace(0.0, 1.0, _FIRST_LEVELS + 1)
-        peak = tension[:, tension.shape[1] // 2]
-        within = self._solved(part[1:, None] * peak[:, None])[1]
-        last = np.logical_and.accumulate(within, axis=1).sum(axis=1)
-        low, high = part[last], part[np.minimum(last + 1, _FIRST_LEVELS)]
-        for _ in range(_HALVINGS):  # rays as a batch
-            middle = 0.5 * (low + high)
-            steps = np.stack([low, middle], axis=1)[:, :, None] * peak[:, None]
-            fits = self._solved(steps)[1][:, 1]
-            low, high = np.where(fits, middle, low), np.where(fits, high, middle)
-        return low
 
     def _solved(
         self, tension: Float[np.ndarray, "r s t"], names: Iterable[str] = ()
