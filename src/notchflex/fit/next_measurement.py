@@ -116,8 +116,11 @@ def next_measurement(
     measured = found.problem.samples.of_robot(label)
     if observed is None:
         observed = tuple(dict.fromkeys(name for one in measured for name in one.observed))
+    check_quantities(observed)
     for name in observed:
-        noise.setdefault(name, _noise_so_far(found, name))
+        so_far = found.noise.deviation[found.residuals.are(name)]
+        size = float(np.sqrt(np.mean(so_far**2))) if len(so_far) else float("nan")
+        noise.setdefault(name, size)
         if np.isnan(noise[name]):
             raise InputError.MISSING_VALUE(
                 f"{name} was not measured so far; give its standard deviation"
@@ -137,13 +140,6 @@ def next_measurement(
     return NextMeasurement(
         label, path, narrower, volume, found.names, tuple(narrow), np.isfinite(volume)
     )
-
-
-def _noise_so_far(calibration: Calibration, name: str) -> float:
-    """Root mean square of the noise of a quantity; NaN if it was not measured."""
-    check_quantities([name])
-    deviation = calibration.noise.deviation[calibration.residuals.are(name)]
-    return float(np.sqrt(np.mean(deviation**2))) if len(deviation) else float("nan")
 
 
 def _solved(

@@ -48,17 +48,14 @@ def no_tendon_column(table: Table, tendons: int) -> InputError:
     label = "" if tendons == 1 else 1
     columns = [QUANTITIES[q].header(tendon=label) for q in ("tension", "stroke")]
     more = "" if tendons == 1 else f" (and so on to tendon {tendons})"
-    return InputError.TABLE_COLUMNS(
-        f"{table.name}: there is no column {columns[0]} or {columns[1]}{more}; {table.columns}. "
-        f'Say which it is: --column tension="{_likely(table)}".'
-    )
-
-
-def _likely(table: Table) -> str:
-    """Return the header that a tension most likely has: of its unit, or the first."""
+    # A tension most likely has a header of its unit, or the first.
     forces = (name for name in table.header if re.search(r"(^|[^A-Za-z])N$", name.rstrip(")] ")))
     header = next(forces, table.header[0])
-    return table.written.get(header, header)
+    likely = table.written.get(header, header)
+    return InputError.TABLE_COLUMNS(
+        f"{table.name}: there is no column {columns[0]} or {columns[1]}{more}; {table.columns}. "
+        f'Say which it is: --column tension="{likely}".'
+    )
 
 
 _UNITS = {
