@@ -137,7 +137,7 @@ def body_wrench(rotation: Float[Array, "d d"], loads: BodyLoads) -> Float[Array,
 
 def is_unloaded(load_path: LoadPath) -> bool:
     """Return whether no external load acts in any step."""
-    return all(load is NOTHING or load.is_nothing for load in load_path.different)
+    return all(load.is_nothing for load in load_path.different)
 
 
 def follows(load_path: LoadPath) -> bool:

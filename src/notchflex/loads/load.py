@@ -238,16 +238,12 @@ class ExternalLoad:
         return load
 
     @property
-    def pulls_down(self) -> bool:
-        """Whether gravity acts: given and not zero, or assumed for a mass at the tip."""
-        return self.tip_mass > 0.0 if self.gravity is None else any(self.gravity)
-
-    @property
     def is_nothing(self) -> bool:
         """Whether no load acts, whatever the robot weighs."""
-        acting = any(self.tip_force) or any(self.tip_moment) or self.pulls_down
-        acting = acting or self.temperature is not None
-        return not acting and not any(
+        # Gravity acts where it is given and not zero, or assumed for a mass at the tip.
+        pulls = self.tip_mass > 0.0 if self.gravity is None else any(self.gravity)
+        acting = pulls or any(self.tip_force) or any(self.tip_moment)
+        return not (acting or self.temperature is not None) and not any(
             any(load.force) or any(load.moment) for load in self.body_forces
         )
 

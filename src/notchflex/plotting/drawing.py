@@ -342,7 +342,17 @@ def notch_rows(robot: Robot, width: float = _WIDTH) -> tuple[list[NotchRow], lis
 def draw_row(axes: Axes, row: NotchRow, top: float) -> None:
     """Draw the views of one notch below a height."""
     axis = top - 0.62 - _LEVEL * len(row.along) - row.outer
-    draw_marks(axes, [label((0.25, top - 0.12), _heading(row), "left center", size=9.0, bold=True)])
+    notch, names = row.notch, shorten(row.names, 48, placeholder=" ...")
+    parts = (
+        f'{"notch" if names.isdigit() else "notches"} {names}: kind "{notch.kind}"',
+        f'cut "{notch.cut}"' if isinstance(notch, ArcNotch) else "",
+        f"bends toward {notch.direction_deg:g}°",
+        "base length 0" if row.held and not row.robot.tube.base_length else "",
+        "" if notch.uncut_length else "uncut length 0",
+        f"scale {scale_text(row.scale)}",
+    )
+    heading = ", ".join(filter(None, parts))
+    draw_marks(axes, [label((0.25, top - 0.12), heading, "left center", size=9.0, bold=True)])
     for view, left in (
         (_side_view, _LEFT),
         (_dimensions, _LEFT),
@@ -358,19 +368,6 @@ def _shifted(mark: Any, origin: Any) -> Any:
     if isinstance(mark, Note):
         return dataclasses.replace(mark, at=np.add(mark.at, origin))
     return dataclasses.replace(mark, points=np.add(mark.points, origin))
-
-
-def _heading(row: NotchRow) -> str:
-    notch, names = row.notch, shorten(row.names, 48, placeholder=" ...")
-    parts = (
-        f'{"notch" if names.isdigit() else "notches"} {names}: kind "{notch.kind}"',
-        f'cut "{notch.cut}"' if isinstance(notch, ArcNotch) else "",
-        f"bends toward {notch.direction_deg:g}°",
-        "base length 0" if row.held and not row.robot.tube.base_length else "",
-        "" if notch.uncut_length else "uncut length 0",
-        f"scale {scale_text(row.scale)}",
-    )
-    return ", ".join(filter(None, parts))
 
 
 def _dimensions(row: NotchRow) -> Iterator[Mark]:

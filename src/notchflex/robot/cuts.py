@@ -181,7 +181,20 @@ def pieces(
     for before, corner, after, radius, sharp in zip(
         corners[:-2], corners[1:-1], corners[2:], radii[1:-1], moved[1:-1], strict=True
     ):
-        tangent, arc = _fillet(before, corner, after, radius, inside)
+        # The length that a fillet takes of both lines, and its arc; none where it is sharp.
+        tangent, arc = 0.0, None
+        first = math.atan2(corner[1] - before[1], corner[0] - before[0])
+        second = math.atan2(after[1] - corner[1], after[0] - corner[0])
+        turn = math.remainder(second - first, math.tau)
+        if radius > 0.0 and turn != 0.0:
+            tangent = radius * math.tan(0.5 * abs(turn))
+            side = math.copysign(1.0, turn)  # of the centre: left of the line for a left turn
+            start = corner[0] - tangent * math.cos(first), corner[1] - tangent * math.sin(first)
+            centre = (
+                start[0] - side * radius * math.sin(first),
+                start[1] + side * radius * math.cos(first),
+            )
+            arc = Arc(centre, radius, first - side * 0.5 * math.pi, turn, inside)
         available = min(math.dist(before, corner) - used, math.dist(corner, after))
         if tangent > available + _ROUNDING:
             raise InputError.OUT_OF_RANGE(
@@ -220,25 +233,6 @@ def shrunk(corners: Sequence[Point], inside: Point, top: float) -> list[Point]:
                 "smaller kerf, less polishing or a larger cut."
             )
     return points
-
-
-def _fillet(
-    before: Point, corner: Point, after: Point, radius: float, inside: Point
-) -> tuple[float, Arc | None]:
-    """Return the length that a fillet takes of both lines, and its arc; none where it is sharp."""
-    first = math.atan2(corner[1] - before[1], corner[0] - before[0])
-    second = math.atan2(after[1] - corner[1], after[0] - corner[0])
-    turn = math.remainder(second - first, math.tau)
-    if radius <= 0.0 or turn == 0.0:
-        return 0.0, None
-    tangent = radius * math.tan(0.5 * abs(turn))
-    side = math.copysign(1.0, turn)  # of the centre: left of the line for a left turn
-    start = corner[0] - tangent * math.cos(first), corner[1] - tangent * math.sin(first)
-    centre = (
-        start[0] - side * radius * math.sin(first),
-        start[1] + side * radius * math.cos(first),
-    )
-    return tangent, Arc(centre, radius, first - side * 0.5 * math.pi, turn, inside)
 
 
 def outline(cut: NotchCut, chord: float) -> list[Point]:
