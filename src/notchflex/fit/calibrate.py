@@ -168,7 +168,14 @@ def fitted(
     if not intervals or not calibration.is_likelihood:
         return calibration
     for number, unknown in enumerate(problem.unknowns, start=1):
-        calibration.intervals[unknown.name] = _interval(calibration, number - 1)
+        name = unknown.name
+        if calibration.tells_no_noise:
+            point = np.array([[calibration.values[name], 0.0]])
+            interval = Interval(None, None, point, "the noise is unknown")
+        else:
+            rise = calibration.allowed_rise(name)
+            interval = calibration.profile(name).interval(rise=rise, scale=unknown.scale)
+        calibration.intervals[name] = interval
         if progress is not None:
             progress("intervals", number, len(problem.unknowns))
     return calibration
@@ -207,11 +214,3 @@ def _with_noise(problem: FitProblem, best: Minimum) -> tuple[FitProblem, Minimum
         if np.allclose(problem.noise.deviation, noise.deviation, rtol=1e-3, atol=0.0):
             break
     return problem, best
-
-
-def _interval(calibration: Calibration, number: int) -> Interval:
-    name, scale = calibration.names[number], calibration.problem.unknowns[number].scale
-    if calibration.tells_no_noise:
-        point = np.array([[calibration.values[name], 0.0]])
-        return Interval(None, None, point, "the noise is unknown")
-    return calibration.profile(name).interval(rise=calibration.allowed_rise(name), scale=scale)
