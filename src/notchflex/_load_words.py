@@ -166,10 +166,19 @@ def load_columns(
         )
     longest = max((*tension, *stroke), key=lambda command: len(command.steps))
     tables = np.full((2, len(longest.steps), tendons), np.nan)
-    commanded: dict[int, str] = {}
+    commanded, has = dict[int, str](), f"{tendons} {what}{'s' * (tendons != 1)}"
     for kind, commands in enumerate((tension, stroke)):
         for source, number, steps in commands:
-            tendon = _tendon(source, number, tendons, what)
+            if number is None and tendons > 1:
+                option, _, text = source.partition(" ")
+                raise InputError.MISSING_VALUE(
+                    f"{source}: the robot has {has}; say which one, for example {option} 1={text}."
+                )
+            tendon = 1 if number is None else number
+            if not 1 <= tendon <= tendons:
+                raise InputError.UNKNOWN_NAME(
+                    f"{source}: there is no {what} {tendon}; the robot has {has}."
+                )
             if tendon in commanded:
                 raise InputError.CONFLICT(
                     f"{source}: {what} {tendon} already has {commanded[tendon]}; give each {what} "
@@ -185,28 +194,12 @@ def load_columns(
     return tables[0], tables[1]
 
 
-def _tendon(source: str, number: int | None, tendons: int, what: str) -> int:
-    """Return the tendon or spool of a command, counted from 1."""
-    has = f"{tendons} {what}{'s' * (tendons != 1)}"
-    if number is None and tendons > 1:
-        option, _, text = source.partition(" ")
-        raise InputError.MISSING_VALUE(
-            f"{source}: the robot has {has}; say which one, for example {option} 1={text}."
-        )
-    chosen = 1 if number is None else number
-    if not 1 <= chosen <= tendons:
-        raise InputError.UNKNOWN_NAME(
-            f"{source}: there is no {what} {chosen}; the robot has {has}."
-        )
-    return chosen
-
-
 class BodyForceOption(NamedTuple):
-    """One `--body-force`: number of the body, force [N], and its point [mm] if given."""
+    """One `--body-force`: number of the body, force [N], and its point [mm]."""
 
     body: int
     force: Vector
-    point: Vector | None
+    point: Vector
 
 
 def read_body_force(text: str) -> BodyForceOption:
@@ -214,6 +207,6 @@ def read_body_force(text: str) -> BodyForceOption:
     match = re.fullmatch(r"\s*(\d{1,9})\s*:([^@]*)(?:@(.*))?", text, re.ASCII | re.DOTALL)
     if match is None:
         raise InputError.BAD_SYNTAX(f"give {_BODY}.")
-    body, force, point = match.groups()
-    where = None if point is None else parse_vector("coordinates in mm")(point)
+    body, force, point = match.groups("0,0,0")
+    where = parse_vector("coordinates in mm")(point)
     return BodyForceOption(int(body), parse_vector("forces in N")(force), where)

@@ -18,13 +18,16 @@ from pathlib import Path
 
 from notchflex.errors import InputError
 
+AnyPath = str | os.PathLike[str]
+"""The path of a file, as text or as an object."""
+
 _PREFIX = ".notchflex-"
 _swept: set[Path] = set()
 """Folders in which this process has looked for what others left."""
 
 
 @contextlib.contextmanager
-def replacing(target: str | os.PathLike[str]) -> Generator[Path]:
+def replacing(target: AnyPath) -> Generator[Path]:
     """Give a path to write to; on success the file there becomes `target`, whole.
 
     The temporary file lies in the folder of `target` and keeps its suffix. If the body of the

@@ -33,6 +33,7 @@ _HOME = {
             "axis_sizes",
         ),
         "notchflex._replacing": (
+            "AnyPath",
             "check_is_path",
             "replacing",
             "unwritable",

@@ -14,6 +14,7 @@ from notchflex._quantity import DEGREES as DEGREES
 from notchflex._quantity import REGISTERED as REGISTERED
 from notchflex._quantity import Quantity as Quantity
 from notchflex._quantity import axis_sizes as axis_sizes
+from notchflex._replacing import AnyPath as AnyPath
 from notchflex._replacing import check_is_path as check_is_path
 from notchflex._replacing import replacing as replacing
 from notchflex._replacing import unwritable as unwritable

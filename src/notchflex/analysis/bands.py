@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary, course
@@ -329,7 +329,22 @@ def closing_bands(robot: Robot, table: Closing) -> ClosingBands | None:
     gaps, forces = (bands.samples[name][:, :, notches] for name in ("gap", "contact_force"))
     stiffness = np.asarray(bands.path.chain.contact_stiffness)[notches]
     angles = bands.samples["notch_angle"][:, :, notches]
-    tension, angle = _closing(loads, gaps, forces > gaps * stiffness, angles)
+    # The gap of a notch of a draw falls almost evenly until it is closed and stands still then, so
+    # the last two open steps are continued.
+    closed = forces > gaps * stiffness
+    first_closed = np.argmax(closed, axis=1)
+    steps = [np.maximum(first_closed - back, 0) for back in range(3)]
+    after, before, earlier = (loads[step] for step in steps)
+    angle, near, far = (
+        np.take_along_axis(values, step[:, None], axis=1)[:, 0]
+        for values, step in zip((angles, gaps, gaps), steps, strict=True)
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        extrapolated = before + near * (before - earlier) / (far - near)
+    closes, never = closed.any(axis=1), np.where(np.isnan(gaps).any(axis=1), np.nan, np.inf)
+    extrapolated = np.clip(extrapolated, before, after)
+    tension = np.where(first_closed > 1, extrapolated, 0.5 * (before + after))
+    tension, angle = np.where(closes, tension, never), np.where(closes, angle, np.nan)
     step = int(np.searchsorted(loads, load))
     total = band(bands.samples["total_angle"][:, step])
     shares = bands.variance_shares("total_angle", step)
@@ -369,31 +384,6 @@ def _pull(robot: Robot, tendon: int, loads: Float[np.ndarray, " s"]) -> LoadPath
     tensions = np.zeros((len(loads), robot.number_of_tendons))
     tensions[:, tendon - 1] = loads
     return LoadPath(tensions)
-
-
-def _closing(
-    loads: Float[np.ndarray, " s"],
-    gaps: Float[np.ndarray, "d s n"],
-    closed: Bool[np.ndarray, "d s n"],
-    angles: Float[np.ndarray, "d s n"],
-) -> tuple[Float[np.ndarray, "d n"], Float[np.ndarray, "d n"]]:
-    """Compute tension and angle at which each notch of each draw closes."""
-    # The gap falls almost evenly until it is closed and stands still then, so the last two open
-    # steps are continued.
-    first = np.argmax(closed, axis=1)
-    steps = [np.maximum(first - back, 0) for back in range(3)]
-    after, before, earlier = (loads[step] for step in steps)
-    angle, near, far = (
-        np.take_along_axis(values, step[:, None], axis=1)[:, 0]
-        for values, step in zip((angles, gaps, gaps), steps, strict=True)
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        extrapolated = before + near * (before - earlier) / (far - near)
-    tension = np.where(first > 1, np.clip(extrapolated, before, after), 0.5 * (before + after))
-    closes = closed.any(axis=1)
-    failed = np.isnan(gaps).any(axis=1)
-    never = np.where(failed, np.nan, np.inf)
-    return np.where(closes, tension, never), np.where(closes, angle, np.nan)
 
 
 def _by_depth(robot: Robot, load: LoadPath) -> float:

@@ -30,6 +30,7 @@ from notchflex.analysis.outputs import (
     LOADS,
     OUTPUTS,
     WORKS,
+    Arrays,
     UnknownOutputError,
     check_outputs,
     follow_row,
@@ -48,6 +49,9 @@ from notchflex.solver.newton import DEFAULT, Settings
 from notchflex.solver.programs.compiled import Packed, number_of_cores, on_cores
 from notchflex.solver.programs.prepare import PreparedChain
 from notchflex.solver.programs.static_structure import PytreeLayout
+
+Rows = Int[np.ndarray, " k"]
+"""Numbers of some rows."""
 
 # Largest number of rows of a piece, by the number of rows.
 _PIECE_SIZES = {0: 64, 512: 256, 8192: 2048}
@@ -317,7 +321,7 @@ def _rows(
     sizes = {name: len(column) for name, column in columns.items()}
     count, places = _places(sizes, product)
 
-    def distinct(names: list[str]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    def distinct(names: list[str]) -> tuple[np.ndarray, Arrays]:
         """Return which combination of some names each row has, and the numbers of each."""
         axes = {name: sizes[name] for name in names}
         number, combinations = _places(axes, product)
@@ -359,7 +363,7 @@ def _numbers(name: str, values: ArrayLike) -> np.ndarray:
     return numbers
 
 
-def _places(sizes: Mapping[str, int], product: bool) -> tuple[int, dict[str, np.ndarray]]:
+def _places(sizes: Mapping[str, int], product: bool) -> tuple[int, Arrays]:
     """Return the number of rows, and of everything that varies its place in each row."""
     if product:
         shape = tuple(sizes.values())
@@ -409,7 +413,7 @@ class LoadRows:
         """Return the number of paths."""
         return len(self.load) // self.steps
 
-    def steps_of(self, paths: Int[np.ndarray, " k"]) -> Int[np.ndarray, "k steps"]:
+    def steps_of(self, paths: Rows) -> Int[np.ndarray, "k steps"]:
         """Return the steps of some paths."""
         return paths[:, None] * self.steps + np.arange(self.steps)
 
@@ -426,32 +430,27 @@ class LoadRows:
         if not values and np.array_equal(which, np.arange(len(self))):
             return self
         load = self.load[self.steps_of(which).ravel()]
-        tables = {
-            name: self._table(name, numbers, load.numbers(name)) for name, numbers in values.items()
-        }
+        tables: Arrays = {}
+        for name, numbers in values.items():
+            present = load.numbers(name)
+            shape = (len(numbers), self.steps, present.shape[1])
+            steps = numbers if numbers.ndim > 2 else numbers.reshape(len(numbers), 1, -1)
+            try:
+                if name in TIP and steps.shape[2] != 3:
+                    raise ValueError
+                tables[name] = np.broadcast_to(steps, shape).reshape(present.shape)
+            except ValueError:
+                last = "3" if name in TIP else f"{shape[2]} tendons or 1"
+                raise InputError.WRONG_SHAPE(
+                    f"`{name}` needs rows by {last}, or rows by {self.steps} steps by {last}; "
+                    f"got numbers of shape {numbers.shape}"
+                ) from None
         load = load.commanding({name: tables[name] for name in TENDONS if name in tables})
         if not any(name in TIP for name in tables):
             return replace(self, load=load)
         tip = np.hstack([tables[name] if name in tables else load.numbers(name) for name in TIP])
         load = load.loaded(tip_force=NO_VECTOR, tip_moment=NO_VECTOR)
         return replace(self, load=load, tip=tip)
-
-    def _table(
-        self, name: str, values: np.ndarray, present: Float[np.ndarray, "s k"]
-    ) -> Float[np.ndarray, "s k"]:
-        """Return numbers of paths in every step."""
-        shape = (len(values), self.steps, present.shape[1])
-        steps = values if values.ndim > 2 else values.reshape(len(values), 1, -1)
-        try:
-            if name in TIP and steps.shape[2] != 3:
-                raise ValueError
-            return np.broadcast_to(steps, shape).reshape(present.shape)
-        except ValueError:
-            last = "3" if name in TIP else f"{shape[2]} tendons or 1"
-            raise InputError.WRONG_SHAPE(
-                f"`{name}` needs rows by {last}, or rows by {self.steps} steps by {last}; "
-                f"got numbers of shape {values.shape}"
-            ) from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -495,16 +494,14 @@ class BatchRows:
             rows = np.concatenate(singly)
         yield from self.one_by_one(rows)
 
-    def _by_kind(
-        self, robot: Robot, rows: Int[np.ndarray, " k"]
-    ) -> Iterator[tuple[int, Int[np.ndarray, " m"]]]:
+    def _by_kind(self, robot: Robot, rows: Rows) -> Iterator[tuple[int, Int[np.ndarray, " m"]]]:
         """Yield what acts, and rows where it does: no row changes the modes of another."""
         loads, steps = self.loads, self.loads.steps_of(self.path_of[rows])
         kinds = np.bitwise_or.reduce(acting(loads.load, robot, steps, loads.tip), axis=1)
         for kind in np.unique(kinds).tolist():
             yield kind, rows[kinds == kind]
 
-    def one_by_one(self, rows: Int[np.ndarray, " k"]) -> Iterator[BatchTable]:
+    def one_by_one(self, rows: Rows) -> Iterator[BatchTable]:
         """Yield rows whose robots are assembled in Python, by the structures of their chains."""
         groups: dict[Any, tuple[list[np.ndarray], dict[int, PreparedChain]]] = {}
         rows = rows[np.argsort(self.robot_of[rows], kind="stable")]
@@ -524,16 +521,26 @@ class BatchRows:
         threads: int,
         tables: Iterable[BatchTable],
         progress: Callable[[int, int], None] | None = None,
-    ) -> dict[str, np.ndarray]:
+    ) -> Arrays:
         """Solve the rows of tables, on several cores."""
-        arrays: dict[str, np.ndarray] = {}
+        arrays: Arrays = {}
         count, done = len(self.robot_of), int((~self.valid).sum())
         work = [(table, rows) for table in tables for rows in table.pieces(threads)]
         solving = on_cores(lambda task: task[0].run(task[1]), work, threads)
         with closing(solving) as pieces:
             for (_, rows), piece in zip(work, pieces, strict=True):
                 for name, values in piece.items():
-                    _store(arrays, name, rows, values, count)
+                    # NaN where robots have fewer notches than others.
+                    missing = np.nan if values.dtype.kind == "f" else 0
+                    shape = count, *values.shape[1:]
+                    array = arrays.get(name, np.full(shape, missing, values.dtype))
+                    wider = np.maximum(array.shape, shape) - array.shape
+                    if wider.any():
+                        array = np.pad(
+                            array, [(0, more) for more in wider], constant_values=missing
+                        )
+                    array[(rows, *map(slice, shape[1:]))] = values
+                    arrays[name] = array
                 done += len(rows)
                 if progress is not None:
                     progress(done, count)
@@ -545,7 +552,7 @@ class BatchTable:
     """Rows of a batch that run through one program."""
 
     batch: BatchRows
-    rows: Int[np.ndarray, " k"]  # their numbers, ascending
+    rows: Rows  # their numbers, ascending
     chains: Chains
     kind: int  # what acts, as bits; see `acting`
 
@@ -557,7 +564,7 @@ class BatchTable:
         size = -(-count // (rounds * cores * WIDTH)) * WIDTH
         return (self.rows[start : start + size] for start in range(0, count, size))
 
-    def run(self, rows: Int[np.ndarray, " m"]) -> dict[str, np.ndarray]:
+    def run(self, rows: Int[np.ndarray, " m"]) -> Arrays:
         """Solve a piece of the rows: quantities in the world, NaN where they are not known."""
         batch = self.batch
         outputs, alike = self.solved(rows)
@@ -568,18 +575,22 @@ class BatchTable:
                 outputs[name][~alike] = values
         return outputs
 
-    def solved(
-        self, rows: Int[np.ndarray, " k"]
-    ) -> tuple[dict[str, np.ndarray], Bool[np.ndarray, " k"]]:
+    def solved(self, rows: Rows) -> tuple[Arrays, Bool[np.ndarray, " k"]]:
         """Solve some rows: quantities as `run` returns them, and which rows are right."""
         names, turn = self.batch.outputs, self.batch.loads.load.base_to_world
         needed = (source for name in names for source in WORKS.get(name, (name,)))
         followed = self.followed(rows, (*dict.fromkeys(needed),))
-        quantities = followed.outputs
-        outputs = {
-            name: _work(quantities, name) if name in WORKS else quantities[name]
-            for name in sorted(names)
-        }
+        outputs: Arrays = {}
+        for name in sorted(names):
+            if name not in WORKS:
+                outputs[name] = followed.outputs[name]
+                continue
+            # Since rest, where force and length are 0.
+            force, length = (
+                (np.concatenate([np.zeros_like(after[:, :1]), after[:, :-1]], axis=1), after)
+                for after in (followed.outputs[quantity] for quantity in WORKS[name])
+            )
+            outputs[name] = np.cumsum(work_of_steps(force, length), axis=1)
         failed = ~outputs["converged"]
         for name, values in outputs.items():
             if name in REGISTERED and values.dtype.kind == "f":
@@ -588,7 +599,7 @@ class BatchTable:
                     outputs[name][failed] = np.nan
         return outputs, followed.alike
 
-    def followed(self, rows: Int[np.ndarray, " k"], names: tuple[str, ...]) -> FollowedRows:
+    def followed(self, rows: Rows, names: tuple[str, ...]) -> FollowedRows:
         """Follow the paths of some rows; report quantities in the frame of the base."""
         batch = self.batch
         chains, alike = self.chains.packed(batch.robot_of[rows])
@@ -613,26 +624,4 @@ class FollowedRows(NamedTuple):
     alike: Bool[np.ndarray, " k"]  # which of the chains are right
     commands: Float[np.ndarray, "k s command"]  # packed loads
     layout: PytreeLayout  # of one load
-    outputs: dict[str, np.ndarray]
-
-
-def _work(outputs: Mapping[str, np.ndarray], name: str) -> np.ndarray:
-    """Return the work since rest, where force and length are 0, rows and steps as leading axes."""
-    force, length = (
-        (np.concatenate([np.zeros_like(after[:, :1]), after[:, :-1]], axis=1), after)
-        for after in (outputs[quantity] for quantity in WORKS[name])
-    )
-    return np.cumsum(work_of_steps(force, length), axis=1)
-
-
-def _store(
-    arrays: dict[str, np.ndarray], name: str, rows: np.ndarray, values: np.ndarray, count: int
-) -> None:
-    """Store the values of some rows; NaN where robots have fewer notches than others."""
-    missing = np.nan if values.dtype.kind == "f" else 0
-    array = arrays.get(name, np.full((count, *values.shape[1:]), missing, values.dtype))
-    wider = np.maximum(array.shape[1:], values.shape[1:]) - array.shape[1:]
-    if wider.any():
-        array = np.pad(array, [(0, more) for more in (0, *wider)], constant_values=missing)
-    array[(rows, *(slice(size) for size in values.shape[1:]))] = values
-    arrays[name] = array
+    outputs: Arrays

@@ -27,11 +27,11 @@ from notchflex.loads import LoadPath
 from notchflex.loads.command import tension_commands
 from notchflex.mechanics.chain import Chain, assemble, sites_of
 from notchflex.mechanics.contact import closing_angles, free_angle
-from notchflex.mechanics.flexure import Site, rod_at
+from notchflex.mechanics.flexure import rod_at
 from notchflex.mechanics.material import FibreSection, Law, peak_strain, section_strain
 from notchflex.results.path import EquilibriumPath
 from notchflex.results.quantities import DEGREES, QUANTITIES
-from notchflex.robot import Robot, TableNotch, Tube
+from notchflex.robot import Robot, TableNotch
 from notchflex.robot.kinds import Notch
 from notchflex.robot.part import fields_in, unit_of
 from notchflex.robot.value_names import number_at
@@ -40,7 +40,16 @@ from notchflex.solver.programs.compiled import number_of_cores
 from notchflex.solver.programs.prepare import PreparedChain, prepare
 from notchflex.solver.programs.run import run, solve_contacts
 
-Overlap = Callable[[Float[np.ndarray, " m"], Bool[np.ndarray, " m"]], Float[np.ndarray, " m"]]
+PerNotch = Float[np.ndarray, " n"]
+"""A number of every notch."""
+
+Which = Bool[np.ndarray, " m"]
+"""Which of the notches that are searched."""
+
+Searched = Float[np.ndarray, " m"]
+"""Tensions or overlaps, one of each notch that is searched."""
+
+Overlap = Callable[[Searched, Which], Searched]
 """From one tension per notch, and which notches are asked for, to their overlaps (mm).
 
 NaN where the solve did not converge. What it gives of the other notches is not read.
@@ -75,8 +84,8 @@ _ROUNDS = 200
 
 
 def closing_tensions(
-    overlap: Overlap, guess: Float[np.ndarray, " m"], precision: float = PRECISION
-) -> tuple[Float[np.ndarray, " m"], np.ndarray]:
+    overlap: Overlap, guess: Searched, precision: float = PRECISION
+) -> tuple[Searched, np.ndarray]:
     """Find the tension that closes each notch, N, NaN where none was found; and its status."""
     low, high, failed = _bracket(overlap, guess)
     bracketed = np.isfinite(high)
@@ -85,16 +94,14 @@ def closing_tensions(
     return np.where(closes, tension, np.nan), statuses(closes, ~bracketed & ~failed)
 
 
-def statuses(closes: Bool[np.ndarray, " m"], never: Bool[np.ndarray, " m"]) -> np.ndarray:
+def statuses(closes: Which, never: Which) -> np.ndarray:
     """Return a `ClosingStatus` for every notch: where neither holds, it was not found."""
     status = np.full(len(closes), ClosingStatus.NOT_FOUND, dtype=object)
     status[closes], status[never] = ClosingStatus.CLOSES, ClosingStatus.NEVER
     return status
 
 
-def _bracket(
-    overlap: Overlap, guess: Float[np.ndarray, " m"]
-) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
+def _bracket(overlap: Overlap, guess: Searched) -> tuple[Searched, Searched, Which]:
     """A tension that leaves each notch open, one that closes it (NaN: none), and failures met."""
     low, high = np.zeros_like(guess), np.full_like(guess, np.nan)
     failing = np.full_like(guess, np.nan)  # smallest tension above `low` that failed
@@ -116,10 +123,10 @@ def _bracket(
 
 def find_roots(
     overlap: Overlap,
-    low: Float[np.ndarray, " m"],
-    high: Float[np.ndarray, " m"],
+    low: Searched,
+    high: Searched,
     precision: float = PRECISION,
-) -> tuple[Float[np.ndarray, " m"], Bool[np.ndarray, " m"]]:
+) -> tuple[Searched, Which]:
     """Find roots by false position, bisecting where that stalls, and whether each is precise."""
     # `low` leaves a notch open, `high` closes it; both are the same for one that is not searched.
     # After a failed solve the next trials are elsewhere in the bracket, ever closer to its low end.
@@ -183,12 +190,12 @@ class Closing(Displayed):
     """
 
     robot: Robot
-    angle: Float[np.ndarray, " n"]
-    tension: Float[np.ndarray, " n"]
+    angle: PerNotch
+    tension: PerNotch
     status: np.ndarray
     tendon: np.ndarray
-    outer_strain: Float[np.ndarray, " n"]
-    peak_strain: Float[np.ndarray, " n"]
+    outer_strain: PerNotch
+    peak_strain: PerNotch
 
     def jacobian(self, names: str | Sequence[str]) -> dict[str, Float[np.ndarray, "n k"]]:
         """Differentiate closing tensions and angles by numbers of the robot.
@@ -280,14 +287,20 @@ def closing(robot: Robot) -> Closing:
     arm = moment_arms(chain)
     tendon, longest = arm.argmax(axis=1), arm.max(axis=1)
     has_spine = np.isfinite(closing_angle)
+    ready, contact_angle = prepare(robot), np.full(len(height), np.nan)
     if not any(pair.acts_on_bodies for pair in chain.contact_pairs):
-        tension, status = _tensions(prepare(robot), tendon, longest, closing_angle)
-        contact_angle = np.full(len(height), np.nan)
+        tension, status = _tensions(ready, tendon, longest, closing_angle)
     else:
         # A backbone has no edges that meet.
         meets = sum((pair.has_contact.sum(axis=-1) for pair in chain.contact_pairs), 0.0 * longest)
-        arms = longest * (meets > 0.0)
-        tension, contact_angle, status = _edge_closing(prepare(robot), tendon, arms)
+        tension, status = contact_angle.copy(), np.full(len(height), ClosingStatus.NEVER, object)
+        for number in np.unique(tendon):
+            # It is pulled in steps from rest, which brackets the tension where an edge touches.
+            pulled = np.flatnonzero((tendon == number) & (longest > 0.0) & (meets > 0.0))
+            if len(pulled):
+                tension[pulled], contact_angle[pulled], status[pulled] = _by_one_tendon(
+                    ready, int(number), pulled
+                )
     elastic = np.where(has_spine, closing_angle / height, np.nan)
     first = jax.tree.map(lambda leaf: leaf[:, 0], section)
     outer, peak = _strains(chain.law, first, elastic, chain.law.rest(first))
@@ -326,9 +339,9 @@ def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
 def _tensions(
     ready: PreparedChain,
     tendon: np.ndarray,
-    arm: Float[np.ndarray, " n"],
-    closing_angle: Float[np.ndarray, " n"],
-) -> tuple[Float[np.ndarray, " n"], np.ndarray]:
+    arm: PerNotch,
+    closing_angle: PerNotch,
+) -> tuple[PerNotch, np.ndarray]:
     """Find the base tension that closes every notch against its spine, and its status."""
     chain = ready.chain
     tension = np.full(chain.flexures, np.nan)
@@ -340,7 +353,7 @@ def _tensions(
     # As many rows as notches, whichever are searched: one compiled program.
     searched, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
 
-    def overlap(tension: Float[np.ndarray, " m"], _: Bool[np.ndarray, " m"]) -> np.ndarray:
+    def overlap(tension: Searched, _: Which) -> np.ndarray:
         value = np.zeros((chain.flexures, chain.tendons))
         value[rows, tendon[searched]] = np.resize(tension, chain.flexures)
         force, gap, converged = solve_contacts(
@@ -354,25 +367,9 @@ def _tensions(
     return tension, status
 
 
-def _edge_closing(
-    ready: PreparedChain, tendon: np.ndarray, arm: Float[np.ndarray, " n"]
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], np.ndarray]:
-    """Find tension, angle and status of closing for notches with edges on rigid pieces."""
-    # The tendon is pulled in steps from rest, which brackets the tension where an edge touches.
-    tension, angle = (np.full(ready.chain.flexures, np.nan) for _ in range(2))
-    status = np.full(ready.chain.flexures, ClosingStatus.NEVER, dtype=object)
-    for number in np.unique(tendon):
-        pulled = np.flatnonzero((tendon == number) & (arm > 0.0))
-        if len(pulled):
-            tension[pulled], angle[pulled], status[pulled] = _by_one_tendon(
-                ready, int(number), pulled
-            )
-    return tension, angle, status
-
-
 def _by_one_tendon(
     ready: PreparedChain, tendon: int, notches: np.ndarray
-) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], np.ndarray]:
+) -> tuple[Searched, Searched, np.ndarray]:
     """Find them for some notches, pulling one tendon."""
     free, _ = _pull(ready, tendon, np.zeros(1))
     reach = -free[0, notches]  # the gap at rest: an edge so far from closing
@@ -384,7 +381,7 @@ def _by_one_tendon(
     closes = touching.any(axis=0)
     after = np.maximum(touching.argmax(axis=0), 1)
 
-    def evaluate(tension: Float[np.ndarray, " m"]) -> tuple[np.ndarray, np.ndarray]:
+    def evaluate(tension: Searched) -> tuple[np.ndarray, np.ndarray]:
         """Compute overlap and angle of every notch, each at its own tension, on one path."""
         order = np.argsort(tension)
         back = np.argsort(order)
@@ -482,10 +479,19 @@ def notch_table(robot: Robot, closing_table: Closing | None = None) -> list[dict
     table = closing(robot) if closing_table is None else closing_table
     arms = moment_arms(assemble(robot, flat=False))
     placed = list(zip(robot.notches, sites_of(robot), strict=True))
-    described = {
-        (notch, site): _description(notch, site, notch.tube or robot.tube)
-        for notch, site in dict.fromkeys(placed)
-    }
+    described: dict[Any, dict[str, Any]] = {}
+    for notch, site in dict.fromkeys(placed):
+        described[notch, site] = values = named_values(notch)
+        if isinstance(notch, TableNotch):  # of no section
+            continue
+        tube = notch.tube or robot.tube
+        rod = rod_at(site, notch, tube)
+        section = rod.section
+        weakest = int(np.argmin(section.second_moment_weak))
+        values["area_mm2"] = float(section.area[weakest])
+        values["second_moment_mm4"] = float(section.second_moment_weak[weakest])
+        if float(rod.has_closure) > 0.0:  # opposite a spine; from the tube axis toward it
+            values["centroid_mm"] = tube.outer_radius - float(section.edge_spine[weakest])
     return [
         {
             "notch": index + 1,
@@ -514,18 +520,3 @@ def named_values(notch: Notch) -> dict[str, Any]:
             values[with_unit] = value
     del values["repeat"]
     return values
-
-
-def _description(notch: Notch, site: Site | None, tube: Tube) -> dict[str, Any]:
-    if isinstance(notch, TableNotch):  # of no section
-        return named_values(notch)
-    rod = rod_at(site, notch, tube)
-    section = rod.section
-    weakest = int(np.argmin(section.second_moment_weak))
-    values: dict[str, Any] = {  # of the weakest section
-        "area_mm2": float(section.area[weakest]),
-        "second_moment_mm4": float(section.second_moment_weak[weakest]),
-    }
-    if float(rod.has_closure) > 0.0:  # opposite a spine; from the tube axis toward it
-        values["centroid_mm"] = tube.outer_radius - float(section.edge_spine[weakest])
-    return named_values(notch) | values

@@ -20,7 +20,14 @@ from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.batch import BatchRows, BatchTable, FollowedRows, LoadRows
 from notchflex.analysis.forward_model import ForwardModel
-from notchflex.analysis.outputs import LOADS, STEPS, OutputTable, check_outputs, slices_of
+from notchflex.analysis.outputs import (
+    LOADS,
+    STEPS,
+    Arrays,
+    OutputTable,
+    check_outputs,
+    slices_of,
+)
 from notchflex.analysis.slopes import (
     SLOPING,
     changes,
@@ -173,7 +180,7 @@ class Differentiable(Displayed):
 
     def one_sided(
         self, direction: Mapping[str, Any], values: Mapping[str, Any] | None = None
-    ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    ) -> tuple[Arrays, Arrays]:
         """Find the derivatives along a direction from its two sides, by differences.
 
         Away from kinks both are the directional derivative that JAX gives; at a kink that one is
@@ -200,7 +207,7 @@ class Differentiable(Displayed):
                 "the direction changes nothing; give a change of some parameter"
             )
 
-        def outputs(part: float) -> dict[str, np.ndarray]:
+        def outputs(part: float) -> Arrays:
             moved = {name: point[name] + part * along[name] for name in point}
             path = self._path(moved).raise_if_failed()
             arrays = {name: np.asarray(getattr(path, name)) for name in self.outputs}
@@ -208,7 +215,7 @@ class Differentiable(Displayed):
 
         middle = outputs(0.0)
 
-        def side(step: float) -> dict[str, np.ndarray]:
+        def side(step: float) -> Arrays:
             near, far = outputs(step), outputs(2.0 * step)
             return {
                 name: (4.0 * near[name] - 3.0 * middle[name] - far[name]) / (2.0 * step)
@@ -333,7 +340,7 @@ class VectorSolver:
     def _sloping(self) -> tuple[str, ...]:
         return tuple(name for name in self.outputs if name in SLOPING)
 
-    def table(self, point: Float[np.ndarray, " n"]) -> dict[str, np.ndarray]:
+    def table(self, point: Float[np.ndarray, " n"]) -> Arrays:
         """Return the outputs; raise `InputError` for values that no robot or load can have."""
         path = self._path_at(point)
         values = {name: np.asarray(getattr(path, name)) for name in self.outputs}
@@ -460,7 +467,7 @@ class VectorSolver:
         """Return values as rows of a batch, those that make robots; None if they need Python."""
         path, row_numbers = self._path, np.arange(len(points))
         distinct, robot_of = np.unique(points[:, self._numbers], axis=0, return_inverse=True)
-        of_robots, of_loads = dict[str, np.ndarray](), dict[str, np.ndarray]()
+        of_robots, of_loads = Arrays(), Arrays()
         for name, start in self.start.items():
             if name in LOADS:
                 of_loads[name] = points[:, self._columns[name]].reshape(-1, *start.shape)
@@ -503,7 +510,7 @@ class VectorSolver:
         tables = (*tables, np.einsum("kn,nsc->ksc", change, self._units))
         carried, by_row = np.zeros_like(tables[0][:, 0]), followed.chains.ndim == 2
         have_rows = (True, by_row, by_row, *(True,) * len(tables))
-        parts: list[dict[str, np.ndarray]] = []
+        parts: list[Arrays] = []
         for step in range(len(self._path)):
             vectors = (carried, followed.chains, by_robot, *(array[:, step] for array in tables))
             carried, by = tangent_step.rows(*map(Packed, vectors, repeat(None), have_rows), layouts)

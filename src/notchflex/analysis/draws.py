@@ -87,11 +87,22 @@ def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed:
     exact = robot.replace(tolerance=None)
     sources = sources_of(exact, tolerances)
     random = np.random.default_rng(seed)
-    levels = _levels(draws, len(sources), random)
+    # Its columns do not correlate (Iman and Conover 1982): in every column one draw lies in each of
+    # as many equal parts. Their random pairing alone would make spreads wrong by 4 % at 256 draws;
+    # without its correlations it is 0.5 %.
+    count = len(sources)
+    part = random.permuted(np.tile(np.arange(draws), (count, 1)), axis=1).T
+    if draws > count + 1 > 2:
+        from scipy.special import ndtri
+
+        normal = ndtri((part + 0.5) / draws)
+        root = np.linalg.cholesky(np.corrcoef(normal, rowvar=False))
+        part = np.linalg.solve(root, normal.T).T.argsort(axis=0).argsort(axis=0)
+    levels = (part + random.random(part.shape)) / draws
     errors = VariedRobots.of(exact, values_at(sources, levels)).errors if sources else {}
     for row in sorted(errors):
         for tried in range(2, _TRIES + 1):
-            levels[row] = random.random(len(sources))
+            levels[row] = random.random(count)
             try:
                 exact.with_values(values_at(sources, levels[row]))
                 break
@@ -102,22 +113,6 @@ def draw_robots(robot: Robot, tolerances: Sequence[Tolerance], draws: int, seed:
                         f"tolerances smaller. The last one: {error}"
                     ) from None
     return Draws(exact, values_at(sources, levels), len(errors))
-
-
-def _levels(
-    draws: int, count: int, random: np.random.Generator
-) -> Float[np.ndarray, "draws count"]:
-    """Draw a Latin hypercube whose columns do not correlate (Iman and Conover 1982)."""
-    # In every column one draw lies in each of as many equal parts. Their random pairing alone would
-    # make spreads wrong by 4 % at 256 draws; without its correlations it is 0.5 %.
-    part = random.permuted(np.tile(np.arange(draws), (count, 1)), axis=1).T
-    if draws > count + 1 > 2:
-        from scipy.special import ndtri
-
-        normal = ndtri((part + 0.5) / draws)
-        root = np.linalg.cholesky(np.corrcoef(normal, rowvar=False))
-        part = np.linalg.solve(root, normal.T).T.argsort(axis=0).argsort(axis=0)
-    return (part + random.random(part.shape)) / draws
 
 
 def values_at(
@@ -218,7 +213,11 @@ def _assumed(robot: Robot) -> Iterator[Tolerance]:
         if _is_number(robot, name):
             yield replace(_FRICTION, value=name)
     yield from _tendon_radius(robot)
-    yield from _law(robot)
+    # The errors of the law of notches with elastic ends, the last one's if it differs.
+    sizes = {name: f"{100.0 * error:.2g} %" for name, error in law_errors(robot).items()}
+    for name, size in sizes.items():
+        if name == "notch" or size != sizes.get("notch"):
+            yield Tolerance(f"{name}.stiffness_factor", sd=size)
 
 
 def _material(path: str, material: Material, robot: Robot) -> Iterator[Tolerance]:
@@ -226,7 +225,9 @@ def _material(path: str, material: Material, robot: Robot) -> Iterator[Tolerance
     for name, field in fields_of(type(material)).items():
         value = f"{path}.{name}"
         if unit_of(field) == "MPa" and name not in _LEFT_OUT and _is_number(robot, value):
-            yield _between(value, *limits.get(name, _MODULUS))
+            lower, mean, upper = limits.get(name, _MODULUS)
+            plus, minus = upper / mean - 1.0, 1.0 - lower / mean
+            yield Tolerance(value, plus=f"{100 * plus:.3g} %", minus=f"{100 * minus:.3g} %")
 
 
 def _tendon_radius(robot: Robot) -> Iterator[Tolerance]:
@@ -239,14 +240,6 @@ def _tendon_radius(robot: Robot) -> Iterator[Tolerance]:
         yield _RADIUS
 
 
-def _law(robot: Robot) -> Iterator[Tolerance]:
-    """Yield the errors of the law of notches with elastic ends, the last one's if it differs."""
-    sizes = {name: f"{100.0 * error:.2g} %" for name, error in law_errors(robot).items()}
-    for name, size in sizes.items():
-        if name == "notch" or size != sizes.get("notch"):
-            yield Tolerance(f"{name}.stiffness_factor", sd=size)
-
-
 def _wall(diameter: float) -> float:
     """Return the standard deviation of a wall, or of a wire, drawn to a diameter [mm]."""
     return max(WALL, WALL_OF_DIAMETER * diameter)
@@ -254,11 +247,6 @@ def _wall(diameter: float) -> float:
 
 def _rounded(size: float) -> float:
     return float(f"{size:.2g}")
-
-
-def _between(name: str, lower: float, usual: float, upper: float) -> Tolerance:
-    plus, minus = upper / usual - 1.0, 1.0 - lower / usual
-    return Tolerance(name, plus=f"{100 * plus:.3g} %", minus=f"{100 * minus:.3g} %")
 
 
 def _is_number(robot: Robot, path: str) -> bool:

@@ -17,7 +17,7 @@ from notchflex.errors import InputError
 from notchflex.mechanics.chain import Chain, assemble, body_lengths
 from notchflex.mechanics.contact import closing_angles, free_angle
 from notchflex.mechanics.flexure.rod_kinematics import node_poses
-from notchflex.mechanics.tendon import TUBE_AXIS, Holes, holes_of, on_tube, passage
+from notchflex.mechanics.tendon import TUBE_AXIS, Holes, holes_of, passage
 from notchflex.results.state import Equilibrium
 from notchflex.robot import Robot
 from notchflex.robot.cuts import CutLayout
@@ -79,10 +79,8 @@ class Geometry:
     @cached_property
     def holes(self) -> Holes | None:
         """Holes of the tendons in all bodies; None where all are parallel to the tube."""
-        tendons = self.robot.tendon
-        radii, sides = zip(*((each.radius, each.direction_deg) for each in tendons), strict=True)
-        lengths = constant(self.body_length)
-        return holes_of(tendons, on_tube(radii, sides), self._chain.rods, lengths)
+        chain = self._chain
+        return holes_of(self.robot.tendon, chain.tendon_entry, chain.rods, chain.body_length)
 
     @property
     def free_angle(self) -> Array:

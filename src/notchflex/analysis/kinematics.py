@@ -22,10 +22,11 @@ from notchflex.solver.residual import body_poses
 if TYPE_CHECKING:
     from notchflex.results.path import EquilibriumPath
 
+Numbers = NDArray[np.float64]
+"""Numbers of any shape."""
 
-def bodies_from_angles(
-    robot: Robot, notch_angle: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+
+def bodies_from_angles(robot: Robot, notch_angle: Numbers) -> tuple[Numbers, Numbers]:
     """Return the poses of all bodies for given notch angles (Pacheco 2021, eq. 1-2).
 
     Args:
@@ -57,9 +58,7 @@ def bodies_from_angles(
     return np.asarray(position), np.asarray(rotation)
 
 
-def tip_from_angles(
-    robot: Robot, notch_angle: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def tip_from_angles(robot: Robot, notch_angle: Numbers) -> tuple[Numbers, Numbers]:
     """Return the tip pose for given notch angles (Pacheco 2021, eq. 1-2).
 
     Args:
@@ -106,11 +105,11 @@ class SharedStroke(NamedTuple):
         stroke_lost: Part of the stroke that closed notches do not take up, mm, (s,).
     """
 
-    notch_angle: NDArray[np.float64]
-    stroke_lost: NDArray[np.float64]
+    notch_angle: Numbers
+    stroke_lost: Numbers
 
 
-def equal_stroke(robot: Robot, stroke: NDArray[np.float64]) -> SharedStroke:
+def equal_stroke(robot: Robot, stroke: Numbers) -> SharedStroke:
     """Share a stroke equally between all notches: the kinematic model of Pacheco 2021, eq. 1-3.
 
     Every notch bends by its share over its moment arm r_i + ybar, from its precurvature on and
@@ -251,7 +250,7 @@ def axis_point_changes(
     return points.imag / _COMPLEX_STEP
 
 
-def axis_points(path: EquilibriumPath, axis_at: ArrayLike) -> NDArray[np.float64]:
+def axis_points(path: EquilibriumPath, axis_at: ArrayLike) -> Numbers:
     """Return points on the tube axis by their distances, mm, in every state, in the world."""
     positions = axis_places(path.robot, axis_at)
     return np.asarray(

@@ -25,6 +25,9 @@ from notchflex.solver.quantities import believable, unpad_quantity
 from notchflex.solver.residual import SolverState, at_rest
 from notchflex.solver.solved_state import SolvedState
 
+Arrays = dict[str, np.ndarray]
+"""Arrays by name."""
+
 OF_STATE = [name for name, quantity in QUANTITIES.items() if quantity.source != "path"]
 """What is reported of a state alone, without its path."""
 DEFAULT_OUTPUTS = ("total_angle", "notch_angle", "tip_position", "tip_rotation", "converged")

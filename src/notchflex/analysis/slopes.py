@@ -18,14 +18,14 @@ from jaxtyping import Float
 from notchflex._quantity import REGISTERED
 from notchflex._summary import Displayed, Summary
 from notchflex.analysis.forward_model import nearby, prepared_like, slope
-from notchflex.analysis.outputs import LOADS, OUTPUTS, check_outputs
+from notchflex.analysis.outputs import LOADS, OUTPUTS, Arrays, check_outputs
 from notchflex.analysis.tangent import Change, Gradient, PathTangents, path_gradient
 from notchflex.errors import InputError
-from notchflex.loads.command import BodyLoads, Command, load_slopes, make_commands
+from notchflex.loads.command import Command, load_slopes, make_commands
 from notchflex.loads.load_path import LoadPath
 from notchflex.results.path import EquilibriumPath
 from notchflex.robot import Robot
-from notchflex.robot.numbers import PartsForm, Place, differing, parts_of, places_by_name
+from notchflex.robot.numbers import PartsForm, Place, parts_of, places_by_name
 from notchflex.robot.value_names import number_at, parse_path
 from notchflex.solver.programs.assembled import chain_gradient, chain_slopes
 from notchflex.solver.programs.prepare import PreparedChain
@@ -44,7 +44,7 @@ _ADJOINT = 4
 
 def jacobian(
     path: EquilibriumPath, names: str | Sequence[str], outputs: str | Sequence[str]
-) -> dict[str, np.ndarray]:
+) -> Arrays:
     """Differentiate quantities of a path; see `EquilibriumPath.jacobian`."""
     names, outputs = _checked(path, names), check_outputs(outputs, SLOPING)
     by = derivatives(path, changes(path, names), outputs)
@@ -54,7 +54,7 @@ def jacobian(
 def gradient(path: EquilibriumPath, weights: Mapping[str, Any]) -> PathGradient:
     """Differentiate a weighted sum of quantities of a path; see `EquilibriumPath.gradient`."""
     _checked(path, ())
-    arrays: dict[str, np.ndarray] = {}
+    arrays: Arrays = {}
     for name in check_outputs(tuple(weights), SLOPING):
         shape = np.shape(path.quantity(name))
         try:
@@ -121,7 +121,7 @@ def _checked(path: EquilibriumPath, names: str | Sequence[str]) -> tuple[str, ..
     return names
 
 
-def start_of(robot: Robot, load: LoadPath, names: Sequence[str]) -> dict[str, np.ndarray]:
+def start_of(robot: Robot, load: LoadPath, names: Sequence[str]) -> Arrays:
     """Return the present values of numbers and loads by name; raise for one that cannot vary."""
     for warning in load.replaced(names):
         raise InputError.CONFLICT(str(warning))
@@ -239,39 +239,17 @@ def _units(places: Sequence[list[Place]], form: PartsForm) -> Float[np.ndarray, 
     return np.array([[place in named for place in form.places] for named in places], float)
 
 
-def change_along(
-    path: EquilibriumPath, robot_at: Callable[[float], Robot], value: float, *, order: int = 6
-) -> Change:
-    """Differentiate arrays and loads of a path along a family of robots, at a number."""
-    # Only the geometry and the loads on the mass may vary; `order` is that of `slope`.
-    robot = robot_at(value)
-
-    def difference(form: PartsForm) -> Float[np.ndarray, "1 numbers"]:
-        return slope(lambda v: form.numbers_of(parts_of(robot_at(v))), value, order=order)[None]
-
-    varied = differing(parts_of(robot), parts_of(nearby(robot_at, value, order)))
-    slopes = chain_slopes(robot, path.chain, varied, difference) if varied else None
-    if slopes is None:
-        return differences(path, robot_at, value, order)
-    return _changes(path, slopes)[0]
-
-
 def _changes(path: EquilibriumPath, slopes: Float[np.ndarray, "k chain"]) -> list[Change]:
     """Return changes of a path's chain with those of the loads on it."""
     loads: Any = [None] * len(slopes)
     if path.chain.loaded:
-        change = path.prepared.chain_layout.unpack(slopes)
-        loads = _packed(path, load_slopes(path.load, path.chain, change))
+        change, commands = path.prepared.chain_layout.unpack(slopes), path.commands
+        none: Any = np.zeros((len(slopes), *np.shape(commands.target)))
+        bend = None if commands.bend is None else none[..., 0]
+        by_stroke = None if commands.by_stroke is None else none
+        still = Command(none, by_stroke, load_slopes(path.load, path.chain, change), bend)
+        loads = path.prepared.command_layout(commands).pack(still, leading=2)
     return [Change(*both) for both in zip(loads, slopes, strict=True)]
-
-
-def _packed(path: EquilibriumPath, by: BodyLoads) -> Float[np.ndarray, "k s command"]:
-    """Pack changes of the loads on bodies."""
-    commands = path.commands
-    none: Any = np.zeros((len(by.dead_force), *np.shape(commands.target)))
-    bend = None if commands.bend is None else none[..., 0]
-    still = Command(none, None if commands.by_stroke is None else none, by, bend)
-    return path.prepared.command_layout(commands).pack(still, leading=2)
 
 
 def differences(
@@ -299,9 +277,7 @@ def _moved(robot: Robot, name: str, names: Iterable[str]) -> Callable[[float], R
     return lambda value: robot.with_values({name: value, **unchanged})
 
 
-def derivatives(
-    path: EquilibriumPath, along: Sequence[Change], outputs: tuple[str, ...]
-) -> dict[str, np.ndarray]:
+def derivatives(path: EquilibriumPath, along: Sequence[Change], outputs: tuple[str, ...]) -> Arrays:
     """Differentiate a solved path along changes of what it is computed from.
 
     Args:

@@ -23,6 +23,7 @@ from notchflex._summary import Displayed, Summary
 from notchflex.analysis.batch import number_of_threads, range_of
 from notchflex.analysis.outputs import (
     OF_STATE,
+    Arrays,
     check_outputs,
     report_quantities,
     slices_of,
@@ -59,6 +60,9 @@ from notchflex.solver.residual import SolverState
 from notchflex.solver.sensitivity import attach_to_part
 from notchflex.solver.solved_state import SolvedState
 
+States = Float[np.ndarray, "*k state"]
+"""Packed states, alone or as rows."""
+
 Drive = Literal["tension", "stroke"]
 """What a tendon is commanded: its tension (N) or its stroke (mm)."""
 
@@ -85,15 +89,15 @@ class Step(Displayed):
     """
 
     stepper: Stepper
-    before: Float[np.ndarray, "*k state"]
+    before: States
     drives: Float[np.ndarray, "*k t"]
-    state: Float[np.ndarray, "*k state"]
+    state: States
     flat_values: Float[np.ndarray, "*k m"]
     flat_jacobian: Float[np.ndarray, "*k m t"]
     converged: Bool[np.ndarray, "*k"]
 
     @cached_property
-    def values(self) -> dict[str, np.ndarray]:
+    def values(self) -> Arrays:
         """The outputs by name, in the world as those of a path; mm, N, rad."""
         return {
             name: part
@@ -103,7 +107,7 @@ class Step(Displayed):
         }
 
     @cached_property
-    def jacobian(self) -> dict[str, np.ndarray]:
+    def jacobian(self) -> Arrays:
         """Change of the outputs per unit of every drive (N or mm), by name, drives as last axis.
 
         It is the derivative of `values` by the drives of this step, the state before unchanged:
@@ -212,7 +216,7 @@ class Stepper(Displayed):
         vars(self).update(outputs=check_outputs(self.outputs, OF_STATE), drives=words)
         _ = self.prepared  # what cannot be prepared is refused now
 
-    def rest(self, rows: int | None = None) -> Float[np.ndarray, "*k state"]:
+    def rest(self, rows: int | None = None) -> States:
         """Return the free robot with slack tendons, as a state to step from.
 
         Args:
@@ -220,7 +224,7 @@ class Stepper(Displayed):
         """
         return _repeated(self.prepared.rest_vector, rows)
 
-    def start(self, rows: int | None = None) -> Float[np.ndarray, "*k state"]:
+    def start(self, rows: int | None = None) -> States:
         """Return `from_state` as a state to step from; rest where none was given.
 
         Args:
@@ -230,7 +234,7 @@ class Stepper(Displayed):
         start = self.from_state.fitted(ready.chain) if self.from_state else ready.rest
         return _repeated(np.asarray(ready.state.pack(start)), rows)
 
-    def step(self, state: Float[np.ndarray, "*k state"], drives: Any) -> Step:
+    def step(self, state: States, drives: Any) -> Step:
         """Move the tendons, from a state.
 
         The result is that of `simulate` with `from_state`: to the last digit for a single robot, to
@@ -257,7 +261,7 @@ class Stepper(Displayed):
             values[~converged] = np.nan
         return Step(self, before, towards, after, values, slopes, converged)
 
-    def named(self, flat: Float[np.ndarray, "*k m"]) -> dict[str, np.ndarray]:
+    def named(self, flat: Float[np.ndarray, "*k m"]) -> Arrays:
         """Return views of flat values, on the last axis, by the names of the outputs."""
         leading = flat.shape[:-1]
         return {
@@ -265,11 +269,11 @@ class Stepper(Displayed):
             for name, (place, shape) in self.places.items()
         }
 
-    def drives_of(self, state: Float[np.ndarray, "*k state"]) -> Float[np.ndarray, "*k t"]:
+    def drives_of(self, state: States) -> Float[np.ndarray, "*k t"]:
         """Return what every tendon is at in a state: its tension (N), or its stroke (mm)."""
         return state[..., self._drive_places]
 
-    def dead_band(self, state: Float[np.ndarray, "*k state"]) -> Float[np.ndarray, "*k t 2"]:
+    def dead_band(self, state: States) -> Float[np.ndarray, "*k t 2"]:
         """Return between which drives nothing moves, while those of the other tendons stay.
 
         There the first contact of a tendon sticks: its tension passes nothing on until it has
@@ -453,9 +457,7 @@ def dead_band(drive: Any, ratio: Any, bound: Any, by_stroke: Any) -> tuple[Any, 
     return low, xp.where(still, drive, xp.maximum(high, drive))
 
 
-def _repeated(
-    state: Float[np.ndarray, " state"], rows: int | None
-) -> Float[np.ndarray, "*k state"]:
+def _repeated(state: Float[np.ndarray, " state"], rows: int | None) -> States:
     if rows is None:
         return state.copy()
     if check_integer(rows, "rows") < 0:

@@ -26,7 +26,12 @@ from jaxtyping import Array, Float, Int
 
 from notchflex._jax import jax, jnp
 from notchflex._quantity import REGISTERED
-from notchflex.analysis.outputs import report_quantities, reported_shapes, unpadded_entries
+from notchflex.analysis.outputs import (
+    Arrays,
+    report_quantities,
+    reported_shapes,
+    unpadded_entries,
+)
 from notchflex.mechanics.chain import Chain
 from notchflex.results.path import EquilibriumPath
 from notchflex.solver.programs.compiled import Native, Packed
@@ -40,6 +45,9 @@ from notchflex.solver.programs.static_structure import (
 from notchflex.solver.quantities import unpad_quantity
 from notchflex.solver.residual import SolverState, slip_mask
 from notchflex.solver.sensitivity import attach_derivatives
+
+State = Float[Array, " state"]
+"""A packed state, or its change."""
 
 
 class StepLayouts(NamedTuple):
@@ -88,7 +96,7 @@ class PathTangents:
     outputs: tuple[str, ...]  # quantities that the solver reports as floats
     remembers: bool = True  # whether changes pass on through the memory of contacts
 
-    def along(self, directions: Sequence[Change]) -> list[dict[str, np.ndarray]]:
+    def along(self, directions: Sequence[Change]) -> list[Arrays]:
         """Differentiate the outputs, in the world, along each of some directions."""
         # NaN from a step on that did not converge, or was so hard that its derivatives are not
         # known.
@@ -98,7 +106,7 @@ class PathTangents:
         start = np.zeros(ready.long.state.size)
         by_row = (*(False,) * 3, *(True,) * (len(self.steps) + 2))
         turn = self.path.load.base_to_world
-        by_direction: list[dict[str, np.ndarray]] = []
+        by_direction: list[Arrays] = []
         for direction in directions:
             change = np.zeros(layouts.chain.size if varies else 1)
             if direction.chain is not None:
@@ -154,8 +162,8 @@ class PathTangents:
 
 
 def step_function(
-    state: Float[Array, " state"],
-    between: Float[Array, " state"],
+    state: State,
+    between: State,
     how: Float[Array, " 4"],
     layouts: StepLayouts,
 ) -> Callable[[Chain, Array, Array], tuple[Array, dict[str, Array]]]:
@@ -174,17 +182,17 @@ def step_function(
 
 @Native
 def tangent_step(
-    last_change: Float[Array, " state"],
+    last_change: State,
     chain: Float[Array, " chain"],
     chain_change: Float[Array, " chain"],
-    before: Float[Array, " state"],
-    state: Float[Array, " state"],
-    between: Float[Array, " state"],
+    before: State,
+    state: State,
+    between: State,
     how: Float[Array, " 4"],
     load: Float[Array, " command"],
     load_change: Float[Array, " command"],
     layouts: StepLayouts,
-) -> tuple[Float[Array, " state"], dict[str, Array]]:
+) -> tuple[State, dict[str, Array]]:
     """Compute the change of a solved state, carried to the next, and of its reported quantities."""
     # The program for loads alone, where the chain does not vary, is a fifth shorter.
     step = step_function(state, between, how, layouts)
@@ -221,7 +229,14 @@ def path_gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> G
     long = path.prepared.long
     tangents = PathTangents(path, tuple(weights))
     layouts = tangents.layouts
-    seeds = _packed(path, weights)
+    # Weights in the frame of the base, for the outputs of the long chain.
+    turn = path.load.base_to_world
+    back = None if turn is None else turn.T
+    shapes = reported_shapes(long.static_structure, long.state, tuple(weights))
+    seeds = np.zeros((len(path), sum(int(np.prod(shape)) for shape in shapes.values()) + 1))
+    for name, index in unpadded_entries(path.prepared, [*weights]).items():
+        seeds[:, index] = REGISTERED[name].turned(weights[name], back)
+    seeds = seeds[:, :-1]  # the last column takes what is beyond the end of a tendon
     # No step beyond the last that counts: one that failed there must not matter.
     backwards = slice(int(np.flatnonzero(seeds.any(axis=1)).max(initial=0)), None, -1)
     steps = [array[backwards] for array in (*tangents.steps, tangents.loads, seeds)]
@@ -237,31 +252,18 @@ def path_gradient(path: EquilibriumPath, weights: Mapping[str, np.ndarray]) -> G
     return Gradient(loads, np.bincount(numbers, by_chain, size)[1:])
 
 
-def _packed(
-    path: EquilibriumPath, weights: Mapping[str, np.ndarray]
-) -> Float[np.ndarray, "s outputs"]:
-    """Pack weights in the frame of the base, for the outputs of the long chain."""
-    turn, long = path.load.base_to_world, path.prepared.long
-    back = None if turn is None else turn.T
-    shapes = reported_shapes(long.static_structure, long.state, tuple(weights))
-    seeds = np.zeros((len(path), sum(int(np.prod(shape)) for shape in shapes.values()) + 1))
-    for name, index in unpadded_entries(path.prepared, [*weights]).items():
-        seeds[:, index] = REGISTERED[name].turned(weights[name], back)
-    return seeds[:, :-1]  # the last column takes what is beyond the end of a tendon
-
-
 @Native
 def adjoint_step(
-    seed: Float[Array, " state"],
+    seed: State,
     chain: Float[Array, " chain"],
-    before: Float[Array, " state"],
-    state: Float[Array, " state"],
-    between: Float[Array, " state"],
+    before: State,
+    state: State,
+    between: State,
     how: Float[Array, " 4"],
     load: Float[Array, " command"],
     weights: Float[Array, " outputs"],
     layouts: StepLayouts,
-) -> tuple[Float[Array, " state"], dict[str, Array]]:
+) -> tuple[State, dict[str, Array]]:
     """Compute the adjoint of a state, carried to the previous one, and of its load and chain."""
     step = step_function(state, between, how, layouts)
     leaves, structure = jax.tree.flatten(layouts.chain.unpack(chain))

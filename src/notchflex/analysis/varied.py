@@ -23,6 +23,9 @@ from notchflex.solver.programs.assembled import AssembledRobots
 from notchflex.solver.programs.prepare import PreparedChain, prepare
 from notchflex.solver.programs.static_structure import StaticStructure
 
+Rows = Int[np.ndarray, " k"]
+"""Numbers of some rows."""
+
 FEW = 256
 """So many robots are assembled in Python before programs for them are compiled."""
 
@@ -66,7 +69,7 @@ class VariedRobots:
                     errors[int(members[row])] = error
         return errors
 
-    def forms(self, numbers: Int[np.ndarray, " k"]) -> Iterator[RobotForm]:
+    def forms(self, numbers: Rows) -> Iterator[RobotForm]:
         """Yield some of the robots by the forms of their parts."""
         forms = dict[PartsForm, RobotForm]()
         for number in np.unique(self.which[numbers]).tolist():
@@ -85,7 +88,7 @@ def _errors(
     robot: Robot,
     names: tuple[str, ...],
     table: Float[np.ndarray, "n d"],
-    rows: Int[np.ndarray, " k"],
+    rows: Rows,
 ) -> Iterator[tuple[int, InputError]]:
     """Yield rows of a table whose numbers make no valid robot, with the reason."""
     # Rules tie a number to its limits, to the tube, a tendon or another number of the same notch,
@@ -103,7 +106,18 @@ def _errors(
         if known_box and (known_box[0] <= low).all() and (high <= known_box[1]).all():
             return
         for box in ((low - wider, high + wider), (low, high)):
-            if _corners_are_valid(robot, names, cliques, np.array(box)):
+            ends = np.array(box)
+            corners = (
+                (list(clique), corner)  # of numbers that belong together
+                for clique in cliques
+                for corner in itertools.product(*ends[:, list(clique)].T)
+            )
+            for clique, corner in corners:
+                tried = ends.mean(axis=0)
+                tried[clique] = corner
+                if _error(robot, names, tried) is not None:
+                    break
+            else:
                 known_box[:] = box
                 return
         spread = np.nan_to_num((high - low) / np.ptp(table, axis=0))
@@ -119,24 +133,7 @@ def _errors(
 @lru_cache(maxsize=16)
 def _known_box(robot: Robot, names: tuple[str, ...]) -> list[np.ndarray]:
     """Return the ends of the last box of numbers that was found valid; none at first."""
-    del robot, names
     return []
-
-
-def _corners_are_valid(
-    robot: Robot,
-    names: tuple[str, ...],
-    cliques: tuple[tuple[int, ...], ...],
-    ends: Float[np.ndarray, "2 d"],
-) -> bool:
-    """Return whether all corners of a box make a valid robot, of numbers that belong together."""
-    for clique in cliques:
-        for corner in itertools.product(*ends[:, list(clique)].T):
-            numbers = ends.mean(axis=0)
-            numbers[list(clique)] = corner
-            if _error(robot, names, numbers) is not None:
-                return False
-    return True
 
 
 def _error(
@@ -158,12 +155,12 @@ class Chains:
 
     ready: PreparedChain  # one of the chains
     structure: StaticStructure  # layout of all
-    packed: Callable[[Int[np.ndarray, " k"]], tuple[np.ndarray, Bool[np.ndarray, " k"]]]
+    packed: Callable[[Rows], tuple[np.ndarray, Bool[np.ndarray, " k"]]]
     programs: AssembledRobots | None = None  # what makes chains from numbers of the form
     form: RobotForm | None = None
 
     def along(
-        self, robots: Int[np.ndarray, " k"], changes: Float[np.ndarray, "k names"]
+        self, robots: Rows, changes: Float[np.ndarray, "k names"]
     ) -> tuple[np.ndarray, Bool[np.ndarray, " k"]]:
         """Differentiate chains along changes of the named values; return also which are right."""
         if self.programs is None or self.form is None:
@@ -171,7 +168,7 @@ class Chains:
         return self.programs.along(self.form.table(robots), changes @ self.form.units)
 
     def back(
-        self, robots: Int[np.ndarray, " k"], weights: Float[np.ndarray, "k chain"]
+        self, robots: Rows, weights: Float[np.ndarray, "k chain"]
     ) -> tuple[Float[np.ndarray, "k names"], Bool[np.ndarray, " k"]]:
         """Differentiate weighted sums of chains by the named values, as `along`."""
         if self.programs is None or self.form is None:
@@ -201,7 +198,7 @@ def single_chains(prepared: Mapping[int, PreparedChain]) -> Chains:
     rows = np.zeros(max(prepared) + 1, int)
     rows[list(prepared)] = np.arange(len(prepared))
 
-    def packed(numbers: Int[np.ndarray, " k"]) -> tuple[np.ndarray, Bool[np.ndarray, " k"]]:
+    def packed(numbers: Rows) -> tuple[np.ndarray, Bool[np.ndarray, " k"]]:
         chains = table[0] if len(table) == 1 else table[rows[numbers]]
         return chains, np.ones(len(numbers), bool)
 
@@ -212,7 +209,7 @@ class RobotForm(NamedTuple):
     """Robots whose parts have one form."""
 
     robots: VariedRobots  # all of the batch
-    members: Int[np.ndarray, " k"]  # numbers of those of this form
+    members: Rows  # numbers of those of this form
     form: PartsForm
     bases: dict[int, Robot]  # robots by number; notches that have a name stand alone
     columns: dict[Place, str]  # names of the numbers that vary, by place
@@ -228,7 +225,7 @@ class RobotForm(NamedTuple):
         names = np.array([self.columns.get(place, "") for place in self.form.places])
         return np.array([*self.robots.values])[:, None] == names
 
-    def table(self, numbers: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k numbers"]:
+    def table(self, numbers: Rows) -> Float[np.ndarray, "k numbers"]:
         """Return the numbers of some robots, as `PartsForm.numbers_of` does."""
         bases = np.zeros((len(self.robots.robots), len(self.form.places)))
         bases[list(self.bases)] = [
@@ -248,7 +245,7 @@ class RobotForm(NamedTuple):
         if programs is None or programs.joined.structure.form is not ready.chain_layout:
             return None
 
-        def packed(numbers: Int[np.ndarray, " k"]) -> tuple[np.ndarray, Bool[np.ndarray, " k"]]:
+        def packed(numbers: Rows) -> tuple[np.ndarray, Bool[np.ndarray, " k"]]:
             distinct, inverse = np.unique(numbers, return_inverse=True)
             chains, alike = programs.chains(self.table(distinct))
             if np.array_equal(distinct, numbers):  # a copy would take time

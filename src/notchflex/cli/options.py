@@ -22,6 +22,7 @@ from notchflex.support import (
     BROWSER,
     PAPER,
     STANDARD_OUTPUT,
+    AnyPath,
     BodyForceOption,
     TendonCommand,
     Vector,
@@ -277,18 +278,16 @@ class Outputs:
             elif name == "plot":
                 text = f"drawing {target}"
                 with terminal.progress(text, compiles=False) as progress:
-                    draw = writers.get(name, partial(_draw, title))
-                    draw(result, target, partial(progress, text))
+                    if name in writers:
+                        writers[name](result, target, partial(progress, text))
+                    else:
+                        from notchflex.plotting import picture
+
+                        picture(result, title=title).save(target)
             elif name in writers:
                 writers[name](result, target)
         if show and self.prints_tables:
             show(result)
-
-
-def _draw(title: str | None, result: Any, target: str, _: object) -> None:
-    from notchflex.plotting import picture
-
-    picture(result, title=title).save(target)
 
 
 def as_csv(columns: Callable[[Any], Mapping[str, Any]]) -> Callable[[Any, str], None]:
@@ -414,8 +413,7 @@ class ExternalLoads:
         given = {name: value for name, value in vars(self).items() if value not in (None, ())}
         if forces := given.pop("body_force", ()):
             given["body_forces"] = [
-                BodyForce(body, force, point=point or (0.0, 0.0, 0.0), following=self.following)
-                for body, force, point in forces
+                BodyForce(**force._asdict(), following=self.following) for force in forces
             ]
         if self.temperature and len(self.temperature) == 1:
             (given["temperature"],) = self.temperature
@@ -462,7 +460,7 @@ class InPieces(Work):
 
     folder: Annotated[str | None, Parameter(metavar="DIR")] = None
 
-    def chosen(self, kind: str, inputs: Iterable[str | os.PathLike[str]]) -> PieceFolder | None:
+    def chosen(self, kind: str, inputs: Iterable[AnyPath]) -> PieceFolder | None:
         """Return the folder, None if none is given; nothing is written.
 
         Args:

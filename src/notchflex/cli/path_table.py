@@ -113,7 +113,12 @@ def print_path(
     elif columns:
         shown = {name: path_columns(path, rows, name) for name in columns}
     else:
-        shown = usual_columns(path, rows)
+        usual = (name for name in USUAL if holds(path, QUANTITIES[name]))
+        shown = {name: path_columns(path, rows, name) for name in usual}
+        largest = 100.0 * np.fmax.reduce(np.abs(path.peak_strain), axis=1)
+        cells = [cell(largest[row] if path.converged[row] else None, ".2f") for row in rows]
+        meaning = "strain: largest strain of all notches [%]"
+        shown["peak_strain"] = [PathColumn("strain\n%", cells, meaning)]
     every = [column for columns in shown.values() for column in columns]
     _print_columns(path, rows, every)
     notes = ["; ".join(dict.fromkeys(column.meaning for column in every))]
@@ -180,18 +185,6 @@ def parse_columns(text: str) -> list[str]:
 
 
 # Columns
-
-
-def usual_columns(path: EquilibriumPath, rows: Sequence[int]) -> dict[str, list[PathColumn]]:
-    """Return the columns that are shown where no quantities are named."""
-    shown = {
-        name: path_columns(path, rows, name) for name in USUAL if holds(path, QUANTITIES[name])
-    }
-    largest = 100.0 * np.fmax.reduce(np.abs(path.peak_strain), axis=1)
-    cells = [cell(largest[row] if path.converged[row] else None, ".2f") for row in rows]
-    meaning = "strain: largest strain of all notches [%]"
-    shown["peak_strain"] = [PathColumn("strain\n%", cells, meaning)]
-    return shown
 
 
 def banded_columns(

@@ -136,7 +136,11 @@ class Comparison:
         return branch_words(off, "total_angle", self.measured)
 
     def _rms(self, errors: Numbers) -> Numbers:
-        return root_mean_square(errors[self.converged])
+        """Return the root mean square over the rows that were solved; NaN without any."""
+        errors = errors[self.converged]
+        count = np.isfinite(errors).sum(axis=0)
+        total = np.nansum(errors**2, axis=0)
+        return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
 
     def __repr__(self) -> str:
         """Return the errors on a few lines."""
@@ -158,13 +162,6 @@ class Comparison:
     def _repr_html_(self) -> str:
         """Return the same for a notebook."""
         return f"<pre>{escape(repr(self))}</pre>"
-
-
-def root_mean_square(errors: Numbers) -> Numbers:
-    """Return the root mean square over the rows; NaN without any."""
-    count = np.isfinite(errors).sum(axis=0)
-    total = np.nansum(errors**2, axis=0)
-    return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
 
 
 def _number(value: float) -> str:
@@ -209,8 +206,14 @@ def compare(robot: Robot, measurements: Measurements) -> Comparison:
     others: dict[str, float] = {}
     for name in _OTHERS:
         if name in measurements.observed and name != angle_name:
-            values = of_model(MEASURED[name].output)
-            others[name] = _error(name, measurements.observed[name], values, converged)
+            # Over the solved rows; of points that of distances.
+            values, others[name] = of_model(MEASURED[name].output)[converged], float("nan")
+            observed = measurements.observed[name][converged]
+            if np.isfinite(observed).any():
+                off, _ = misfit(name, observed, values, np.zeros((0, *values.shape)))
+                squares = off.reshape(-1, 3 if MEASURED[name].is_vector else 1) ** 2
+                known = np.isfinite(squares).any(axis=1).sum()
+                others[name] = float(np.sqrt(np.nansum(squares) / known))
     return Comparison(
         robot=robot,
         measured=measurements,
@@ -293,16 +296,6 @@ def _tip_in_world(robot: Robot, measured: Measurements, angles: Numbers) -> Numb
     """Forward kinematics of notch angles, with the base rotation."""
     tip, _ = tip_from_angles(robot, angles)
     return QUANTITIES["tip_position"].turned(np.asarray(tip), measured.load.base_to_world)
-
-
-def _error(name: str, observed: Numbers, values: Numbers, converged: Numbers) -> float:
-    """Root-mean-square error of a quantity over the solved rows; of points that of distances."""
-    if not np.isfinite(observed[converged]).any():
-        return float("nan")
-    none = np.zeros((0, *values[converged].shape))
-    off, _ = misfit(name, observed[converged], values[converged], none)
-    squares = off.reshape(-1, 3 if MEASURED[name].is_vector else 1) ** 2
-    return float(np.sqrt(np.nansum(squares) / np.isfinite(squares).any(axis=1).sum()))
 
 
 def _pairs(comparison: Comparison) -> dict[str, tuple[Numbers, Numbers]]:

@@ -144,8 +144,11 @@ class Controller:
             # A control loop must continue after invalid input: the command stays unchanged.
             self.status = ControlStatus(False, "INVALID_INPUT", float("nan"), 0, True)
             return self._command.copy()
-        if seen is not None:
-            self._correct(seen)
+        if seen is not None:  # a part of how far the robot is from the model
+            deviation = seen - self.values
+            change = self._feedback * (deviation - self._deviation)
+            change = np.where(np.isfinite(deviation), change, 0.0)
+            self._deviation = self._deviation + change
         self._seek(goal - self._deviation)
         return self._command.copy()
 
@@ -180,13 +183,6 @@ class Controller:
                 part = part / np.sqrt(part @ part)
             parts.append(part.ravel())
         return np.concatenate(parts)
-
-    def _correct(self, measured: np.ndarray) -> None:
-        """Take up a part of how far the robot is from the model."""
-        deviation = measured - self.values
-        is_measured = np.isfinite(deviation)
-        change = self._feedback * (deviation - self._deviation)
-        self._deviation = np.where(is_measured, self._deviation + change, self._deviation)
 
     def _observe(self, observer: Observer, tension: Any, stroke: Any) -> None:
         """Continue from the state estimated from measured tension and stroke."""

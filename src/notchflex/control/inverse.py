@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any, Literal, get_args
 
 import numpy as np
-from jaxtyping import Float
 
 from notchflex import InputError, Load, LoadPath, Robot, State
 from notchflex.control.following import Following, Reach
@@ -158,7 +157,15 @@ def _follow(
             response = attempt.response
             before = response.step.state
     values = [attempt.response.step.flat_values[problem.entries] for attempt in attempts]
-    loads, misses = _load_path(problem, np.array(drives)), np.array(values) - goals
+    stepper, ways = problem.stepper, np.array(drives)
+    by_stroke = np.array(stepper.drives) == "stroke"
+    loads = load_path(stepper.loads, len(by_stroke))
+    loads = LoadPath(
+        np.where(by_stroke, np.nan, np.maximum(ways, 0.0)),
+        np.where(by_stroke, ways, np.nan),
+        loads.base_rotation,
+        loads.external * len(ways),
+    )
     return Following(
         robot,
         targets,
@@ -166,18 +173,9 @@ def _follow(
         np.array(last),
         tuple(attempts),
         options.state,
-        misses,
+        np.array(values) - goals,
         problem.search,
     )
-
-
-def _load_path(problem: Problem, drives: Float[np.ndarray, "k t"]) -> LoadPath:
-    stepper = problem.stepper
-    by_stroke = np.array(stepper.drives) == "stroke"
-    loads = load_path(stepper.loads, len(by_stroke))
-    tension = np.where(by_stroke, np.nan, np.maximum(drives, 0.0))
-    stroke = np.where(by_stroke, drives, np.nan)
-    return LoadPath(tension, stroke, loads.base_rotation, loads.external * len(drives))
 
 
 def _approach(

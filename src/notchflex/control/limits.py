@@ -70,23 +70,18 @@ class Limits:
             drive: "tension" or "stroke".
             tendons: Number of tendons of the robot.
         """
-        least = 0.0 if drive == "tension" else -np.inf
-        low, high = (
-            self._of_tendons(drive, side, none, tendons)
-            for side, none in zip(getattr(self, drive), (least, np.inf), strict=True)
-        )
-        return low, high
-
-    @staticmethod
-    def _of_tendons(drive: str, side: Any, none: float, tendons: int) -> np.ndarray:
-        entries = list(side) if np.ndim(side) else [side]
-        if len(entries) not in (1, tendons):
-            raise InputError.WRONG_SHAPE(
-                f"the limits of {drive} have {len(entries)} entries for {tendons} tendons; give "
-                "one number, or one per tendon"
-            )
-        numbers = [none if e is None else check_number(e, f"a limit of {drive}") for e in entries]
-        return np.broadcast_to(numbers, (tendons,)).astype(float)
+        least, ends = 0.0 if drive == "tension" else -np.inf, list[np.ndarray]()
+        for side, none in zip(getattr(self, drive), (least, np.inf), strict=True):
+            entries = list(side) if np.ndim(side) else [side]
+            if len(entries) not in (1, tendons):
+                raise InputError.WRONG_SHAPE(
+                    f"the limits of {drive} have {len(entries)} entries for {tendons} tendons; "
+                    "give one number, or one per tendon"
+                )
+            what = f"a limit of {drive}"
+            numbers = [none if entry is None else check_number(entry, what) for entry in entries]
+            ends.append(np.broadcast_to(numbers, (tendons,)).astype(float))
+        return ends[0], ends[1]
 
 
 def limits_of_robot(

@@ -95,7 +95,15 @@ class Observer:
         read = self._checked(tension, stroke)
         self.accepted = read is not None
         if read is not None:
-            self._compare(*read)
+            pulled, drawn = read
+            for number, model in enumerate(self._models):
+                step = model.step(self._states[number], pulled)
+                if not step.converged:
+                    continue
+                self._states[number] = step.state
+                miss = (step.flat_values - drawn) / self._noise
+                miss = miss[np.isfinite(miss) & (pulled > 0.0)]
+                self._cost[number] = self._forgets * self._cost[number] + float(miss @ miss)
         best = int(np.argmin(self._cost))
         return best, self._states[best]
 
@@ -108,16 +116,6 @@ class Observer:
         shape = (len(self._models[0].drives),)
         right = pulled.shape == drawn.shape == shape and np.isfinite(pulled).all()
         return (pulled, drawn) if right and not np.isinf(drawn).any() else None
-
-    def _compare(self, pulled: np.ndarray, drawn: np.ndarray) -> None:
-        for number, model in enumerate(self._models):
-            step = model.step(self._states[number], pulled)
-            if not step.converged:
-                continue
-            self._states[number] = step.state
-            miss = (step.flat_values - drawn) / self._noise
-            miss = miss[np.isfinite(miss) & (pulled > 0.0)]
-            self._cost[number] = self._forgets * self._cost[number] + float(miss @ miss)
 
     @property
     def weights(self) -> Float[np.ndarray, " models"]:

@@ -172,11 +172,6 @@ class Problem(NamedTuple):
         )
         return self._replace(low=low, high=high)
 
-    @property
-    def without_rate(self) -> Problem:
-        """The problem with drives as far from the present ones as they may be at all."""
-        return self._replace(low=self.allowed[0], high=self.allowed[1])
-
     def slopes(self, step: Step) -> Float[np.ndarray, "m t"]:
         """Return the slopes of what is targeted, then of what is limited."""
         rows = step.flat_jacobian[self.entries]
@@ -245,7 +240,17 @@ def make_problem(robot: Robot, targets: Targets, options: ProblemOptions) -> Pro
     limited = limits_of_robot(limits, drive, robot)
     outputs = {*targets.outputs, *(quantity for quantity, _, _ in limited)}
     words = np.where(held, np.where(np.isnan(stroke), "tension", "stroke"), drive).tolist()
-    stepper = _stepper(robot, outputs, words, options)
+    # With those usually asked beside them: fewer programs.
+    usual = [name for group in _ASKED_TOGETHER if outputs & {*group} for name in group]
+    stepper = Stepper(
+        robot,
+        tuple(dict.fromkeys([*usual, *sorted(outputs)])),
+        drives=words,
+        jacobian=True,
+        loads=replace(options.load or Load(), tension=None, stroke=None),
+        from_state=options.state,
+        refinement=0 if options.state is None else options.state.refinement,
+    )
     chain = stepper.prepared.chain
     by_tension = drive == "tension"
     unit = float(chain.closing_force if by_tension else np.asarray(chain.rods.length).sum())
@@ -275,20 +280,3 @@ def _limited_entries(
     rows = np.array([np.concatenate([[], *part]) for part in (entries, limits, factors)])
     entries, limits, factors = rows[:, np.isfinite(rows[1])]
     return LimitedEntries(entries.astype(int), limits, factors)
-
-
-def _stepper(
-    robot: Robot, outputs: set[str], drives: list[Drive], options: ProblemOptions
-) -> Stepper:
-    """The robot under the loads of the user."""
-    # With those usually asked beside them: fewer programs.
-    usual = [name for group in _ASKED_TOGETHER if outputs & {*group} for name in group]
-    return Stepper(
-        robot,
-        tuple(dict.fromkeys([*usual, *sorted(outputs)])),
-        drives=drives,
-        jacobian=True,
-        loads=replace(options.load or Load(), tension=None, stroke=None),
-        from_state=options.state,
-        refinement=0 if options.state is None else options.state.refinement,
-    )

@@ -245,7 +245,8 @@ def find(
     limited = attempt.failure is not None and np.isfinite(problem.rate)
     if not limited or (left is not None and left <= 0):
         return attempt
-    ahead = _find(problem.without_rate, before, goal, known, left, True)
+    low, high = problem.allowed  # as far as the drives may be at all
+    ahead = _find(problem._replace(low=low, high=high), before, goal, known, left, True)
     search, response = DriveSearch(problem, before, goal), None
     if ahead.failure is None:
         nearest = np.clip(ahead.drives, problem.low, problem.high)

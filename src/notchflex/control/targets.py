@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, cast
@@ -16,6 +15,7 @@ from notchflex.support import (
     AXES,
     DEGREES,
     REGISTERED,
+    AnyPath,
     axis_sizes,
     check_is_robot,
     check_number,
@@ -176,7 +176,16 @@ def _checked(values: Mapping[str, np.ndarray], robot: Robot) -> Targets:
             f"target {int(np.argmax(empty)) + 1} has no number: all of its entries are free"
         )
     if DIRECTION in values:
-        values = {**values, DIRECTION: _unit(values[DIRECTION])}
+        # Unit vectors; one with free entries must have them as they are meant.
+        directions = values[DIRECTION]
+        length = np.linalg.norm(directions, axis=1, keepdims=True)
+        whole = ~np.isnan(length[:, 0])
+        if (length[whole] == 0.0).any() or (np.abs(directions[~whole]) > 1.0).any():
+            raise InputError.OUT_OF_RANGE(
+                "tip_direction must not be zero, and no entry beside a free one may exceed 1"
+            )
+        units = np.where(whole[:, None], directions / length, directions)
+        values = {**values, DIRECTION: units}
     return Targets(values)
 
 
@@ -197,19 +206,8 @@ def _numbers(value: Any, name: str) -> np.ndarray:
     return np.where(free, np.nan, np.reshape(numbers, entries.shape))
 
 
-def _unit(directions: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
-    """Directions as unit vectors; one with free entries must have them as they are meant."""
-    length = np.linalg.norm(directions, axis=1, keepdims=True)
-    whole = ~np.isnan(length[:, 0])
-    if (length[whole] == 0.0).any() or (np.abs(directions[~whole]) > 1.0).any():
-        raise InputError.OUT_OF_RANGE(
-            "tip_direction must not be zero, and no entry beside a free one may exceed 1"
-        )
-    return np.where(whole[:, None], directions / length, directions)
-
-
 def read_targets(
-    source: str | os.PathLike[str], robot: Robot, columns: Mapping[str, str] | None = None
+    source: AnyPath, robot: Robot, columns: Mapping[str, str] | None = None
 ) -> Targets:
     r"""Read targets from a CSV file.
 

@@ -7,7 +7,6 @@ it; every point is then polished by SLSQP: the first objective least, the others
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -48,6 +47,7 @@ from notchflex.designing.variables import Probe, drives_of, load_steps, variable
 from notchflex.search.slsqp import TOLERANCE, minimise
 from notchflex.specification import placed, with_robot
 from notchflex.support import (
+    AnyPath,
     check_number,
     from_table,
     need,
@@ -160,7 +160,7 @@ def with_notches(robot: Robot, count: int) -> Robot:
 
 
 def design(
-    spec: DesignSpec | Mapping[str, Any] | str | os.PathLike[str],
+    spec: DesignSpec | Mapping[str, Any] | AnyPath,
     *,
     robot: Robot | None = None,
     robust: bool = False,
@@ -282,7 +282,7 @@ def _reason(searches: Searches, is_missed: bool, lacks_yield: bool) -> str:
 
 
 def design_front(
-    spec: DesignSpec | Mapping[str, Any] | str | os.PathLike[str],
+    spec: DesignSpec | Mapping[str, Any] | AnyPath,
     *,
     robot: Robot | None = None,
     points: int = 12,

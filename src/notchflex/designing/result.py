@@ -22,6 +22,7 @@ from notchflex.designing.solver import distances
 from notchflex.designing.specification import DesignSpec
 from notchflex.search.slsqp import TOLERANCE
 from notchflex.support import (
+    AnyPath,
     Displayed,
     Summary,
     check_folder,
@@ -59,9 +60,7 @@ class SavedInFolder(Displayed):
         """By name of a file what writes it."""
         raise NotImplementedError
 
-    def save(
-        self, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
-    ) -> tuple[Path, ...]:
+    def save(self, folder: AnyPath, *, inputs: Iterable[str | Path] = ()) -> tuple[Path, ...]:
         """Write robot files, tables, documents and pictures into a folder.
 
         Args:
@@ -216,9 +215,14 @@ class Design(SavedInFolder):
     def _contents(self) -> dict[str, Writer]:
         """The robot file, the table, the document and the picture."""
         robot, table, document, picture = FILES
+        rows = [  # one for every number asked
+            (wish.title, part, wish.unit, wish.asked, value, before, _MET[wish.met])
+            for wish in self.wishes
+            for part, value, before in zip_longest(wish.parts, wish.achieved, wish.before)
+        ]
         return {
             robot: self.write_robot,
-            table: lambda file: write_csv(file, _HEADS, _wish_rows(self.wishes)),
+            table: lambda file: write_csv(file, _HEADS, rows),
             document: lambda file: write_json(file, design_document(self)),
             **picture_of(self, picture),
         }
@@ -297,15 +301,6 @@ def numbers(values: Sequence[float]) -> str:
     if high - low <= 1e-6 * max(abs(low), abs(high)):
         return short(low)
     return f"{short(low)} to {short(high)}"
-
-
-def _wish_rows(wishes: Iterable[WishResult]) -> list[tuple[Any, ...]]:
-    """Return a row for every number asked."""
-    return [
-        (wish.title, part, wish.unit, wish.asked, value, before, _MET[wish.met])
-        for wish in wishes
-        for part, value, before in zip_longest(wish.parts, wish.achieved, wish.before)
-    ]
 
 
 def design_document(made: Design) -> dict[str, Any]:

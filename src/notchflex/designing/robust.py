@@ -220,14 +220,11 @@ def met_by(
             continue
         states = {name: array[row] for name, array in arrays.items()}
         point = Point(x, robot, solver.steps, states, closed=tension)
-        met[row] = [_meets(wish, point) for wish in wishes]
+        for number, wish in enumerate(wishes):
+            sizes = np.array([one.size or 1.0 for one in wish.rows])
+            missed = violation(wish.row_numbers(point)[:, 0], limits_of(wish.rows), sizes)
+            met[row, number] = (np.abs(missed) <= TOLERANCE).all()  # not where a value is NaN
     return met
-
-
-def _meets(wish: ConstraintWish, point: Point) -> bool:
-    sizes = np.array([row.size or 1.0 for row in wish.rows])
-    missed = violation(wish.row_numbers(point)[:, 0], limits_of(wish.rows), sizes)
-    return bool((np.abs(missed) <= TOLERANCE).all())  # not where a value is NaN
 
 
 @dataclass(frozen=True)

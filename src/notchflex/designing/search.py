@@ -110,7 +110,10 @@ def search(
                 ends = search_from(problem, first, options.iterations)
                 searches.outcomes += ends
                 settled += [end for end in ends if end.is_stationary]
-                if _agreed(settled) >= max(2, (several + 1) // 2):
+                # How many have settled at the best robot.
+                places = [end.evaluation.z for end in sorted(settled, key=lambda end: end.merit)]
+                agreed = sum(np.abs(z - places[0]).max(initial=0.0) < _SAME for z in places)
+                if agreed >= max(2, (several + 1) // 2):
                     break
     except KeyboardInterrupt:
         searches.interrupted = True
@@ -124,12 +127,6 @@ def search(
             f"{most.splitlines()[0].rstrip('.')}. Change the limits or the loads."
         )
     return searches
-
-
-def _agreed(settled: Sequence[SearchResult]) -> int:
-    """Return how many searches have settled at the best robot."""
-    places = [end.evaluation.z for end in sorted(settled, key=lambda end: end.merit)]
-    return sum(np.abs(z - places[0]).max(initial=0.0) < _SAME for z in places)
 
 
 def search_from(

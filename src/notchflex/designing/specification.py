@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import KW_ONLY
 from typing import Annotated, Any, Literal
@@ -22,6 +21,7 @@ from notchflex.specification import (
     with_robot,
 )
 from notchflex.support import (
+    AnyPath,
     Float,
     FloatOrInf,
     Int,
@@ -347,7 +347,7 @@ class DesignSpec(OldWords):
         return self
 
 
-def read_design(path: str | os.PathLike[str]) -> tuple[DesignSpec, Robot]:
+def read_design(path: AnyPath) -> tuple[DesignSpec, Robot]:
     """Read a design file and the robot that it names.
 
     Args:

@@ -77,11 +77,6 @@ class HingeSpring:
         """Angles over the whole range."""
         return np.linspace(self.low, self.high, 201)
 
-    @property
-    def largest_stiffness(self) -> float:
-        """Largest slope of the elastic moment over the range."""
-        return float(np.abs(np.gradient(self.moment(self.range), self.range)).max())
-
     def drum(self) -> tuple[float, float, Array] | None:
         """Return the friction as that of a drum which the hinge turns by a polynomial of its angle.
 
@@ -123,7 +118,17 @@ def fit_spring(
     # The columns of all candidates, once: a fit with some of them is one to this triangle.
     slope = (rising * np.sign(angle))[:, None] * _friction(angle)
     columns = np.concatenate([_elastic(angle, places), slope, moment[:, None]], axis=1)
-    weight = _weights(angle, moment, rising, stiffness) / np.sqrt(len(angle))
+    # Angle per moment along the branches: what is to be small is the error of the angle.
+    weight = np.full(len(angle), 1.0 / stiffness)
+    for way, side in product((-1.0, 1.0), (-1.0, 0.0, 1.0)):
+        rows = np.flatnonzero((rising == way) & (np.sign(angle) == side))
+        if len(rows) > 2:
+            rows = rows[np.argsort(moment[rows], kind="stable")]
+            change, step = (np.abs(np.gradient(values[rows])) for values in (moment, angle))
+            # Two pulls may turn a hinge by the same to the last digit.
+            ratio = np.divide(step, change, out=weight[rows], where=change > 0.0)
+            weight[rows] = np.minimum(ratio, _SOFTEST / stiffness)
+    weight = weight / np.sqrt(len(angle))
     triangle = np.asarray(np.linalg.qr(columns * weight[:, None], mode="r"))
     knots: list[int] = []
     error, coefficients = _least_squares(triangle, knots)
@@ -148,25 +153,6 @@ def _least_squares(triangle: Array, knots: Sequence[int]) -> tuple[float, Array]
     scale[scale == 0.0] = 1.0
     coefficients = np.linalg.lstsq(matrix / scale, triangle[:, -1], rcond=1e-10)[0] / scale
     return float(np.linalg.norm(matrix @ coefficients - triangle[:, -1])), coefficients
-
-
-def _weights(
-    angle: Array,
-    moment: Array,
-    rising: Array,
-    stiffness: float,
-) -> Array:
-    """Angle per moment along the branches: what is to be small is the error of the angle."""
-    weight = np.full(len(angle), 1.0 / stiffness)
-    for way, side in product((-1.0, 1.0), (-1.0, 0.0, 1.0)):
-        rows = np.flatnonzero((rising == way) & (np.sign(angle) == side))
-        if len(rows) > 2:
-            rows = rows[np.argsort(moment[rows], kind="stable")]
-            change, step = (np.abs(np.gradient(values[rows])) for values in (moment, angle))
-            # Two pulls may turn a hinge by the same to the last digit.
-            ratio = np.divide(step, change, out=weight[rows], where=change > 0.0)
-            weight[rows] = np.minimum(ratio, _SOFTEST / stiffness)
-    return weight
 
 
 def _elastic(angle: Array, knots: Array) -> Array:

@@ -155,13 +155,6 @@ def _problem(robot: Robot, notch: object) -> str:
     return ""
 
 
-def _edge_angle(notch: ArcNotch, robot: Robot, radius: Array) -> Array:
-    """Return half the angle of the wall that a notch leaves, at some radii, rad."""
-    outer = robot.tube.outer_radius
-    cut_at = radius if notch.cut == "off-axis" else np.full(len(radius), outer)
-    return np.arccos((notch.section_depth(robot.tube) - outer) / cut_at)
-
-
 def _layers(
     robot: Robot, notches: Sequence[ArcNotch], options: DeckOptions
 ) -> tuple[Array, Numbers]:
@@ -212,7 +205,16 @@ def mesh_of(robot: Robot, options: DeckOptions, tendons: Sequence[int] = (0,)) -
     is_half = all(abs((turn + 180.0) % 360.0 - 180.0) < _SAME for turn in turns)
     radius = np.linspace(robot.tube.inner_radius, robot.tube.outer_radius, 2 * options.wall + 1)
     heights, faces = _layers(robot, notches, options)
-    edges = np.stack([_edge_angle(notch, robot, radius) for notch in notches])  # (n, radii)
+    outer = robot.tube.outer_radius
+    edges = np.stack(  # half the angle of the wall that every notch leaves, (n, radii)
+        [
+            np.arccos(
+                (notch.section_depth(robot.tube) - outer)
+                / (radius if notch.cut == "off-axis" else np.full(len(radius), outer))
+            )
+            for notch in notches
+        ]
+    )
     if is_half:
         # Between two notches the lines go over from the edge of one to that of the next.
         edge = _over(heights, faces, edges)[:, None]

@@ -139,7 +139,8 @@ def _bodies(model: JointModel, drums: Drums) -> str:
     for j in range(len(model.springs), 0, -1):
         free, lever, spring = hinges.free_rotation[j - 1], hinges.lever[j - 1], model.springs[j - 1]
         quat = Rotation.from_matrix(free).as_quat(canonical=True, scalar_first=True)
-        stiffness = _METRE * spring.largest_stiffness
+        slopes = np.gradient(spring.moment(spring.range), spring.range)
+        stiffness = _METRE * float(np.abs(slopes).max())
         armature = with_drum = stiffness * _RESOLVED
         if j in drums:
             moment, slope, _ = drums[j]

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from notchflex import InputError, Robot, __version__
+from notchflex import InputError, __version__
 from notchflex.export.cuts import RobotCuts, check_one_tube, cuts_of
 from notchflex.export.formats import Document, SolidOptions, Subject, plain_name
 from notchflex.export.solids import (
@@ -49,7 +49,14 @@ def step_solid(subject: Subject, options: SolidOptions) -> Document:
         )
     check_one_tube(robot)
     cuts = cuts_of(robot, options.shank, options.polishing)
-    solid = _straight(robot, cuts, options)
+    tube, ends, (drill, places) = cuts.tube, (cuts.start, cuts.end), channels(robot, options)
+    removed = [_cylinder(tube.inner_radius, *ends)]
+    removed += [_removed(placed.cut, tube.outer_radius) for placed in cuts.cuts]
+    removed += [_cylinder(drill, *ends, place) for place in places]
+    solid = _cylinder(tube.outer_radius, *ends).cut(*removed)
+    for low, high, outer, inner in cuts.rings:
+        ring = _cylinder(outer, low, high)
+        solid = solid.fuse(ring.cut(_cylinder(inner, low, high)) if inner else ring)
     check_one_piece(len(solid.solids()))
     solid = _bent(solid, DeformationMap(subject, cuts), cuts) if bent else solid.solids()[0]
     digest, box = robot_digest(robot), solid.bounding_box()
@@ -78,19 +85,6 @@ def _cylinder(radius: float, low: float, high: float, place: Point = (0.0, 0.0))
     """Return a cylinder along z, between two heights."""
     cad = import_module("build123d")
     return cad.Solid.make_cylinder(radius, high - low, cad.Plane((*place, low)))
-
-
-def _straight(robot: Robot, cuts: RobotCuts, options: SolidOptions) -> Any:
-    """Return the straight tube without cuts and channels."""
-    tube, ends, (drill, places) = cuts.tube, (cuts.start, cuts.end), channels(robot, options)
-    removed = [_cylinder(tube.inner_radius, *ends)]
-    removed += [_removed(placed.cut, tube.outer_radius) for placed in cuts.cuts]
-    removed += [_cylinder(drill, *ends, place) for place in places]
-    solid = _cylinder(tube.outer_radius, *ends).cut(*removed)
-    for low, high, outer, inner in cuts.rings:
-        ring = _cylinder(outer, low, high)
-        solid = solid.fuse(ring.cut(_cylinder(inner, low, high)) if inner else ring)
-    return solid
 
 
 def _removed(cut: NotchCut, outer: float) -> Any:

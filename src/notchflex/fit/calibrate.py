@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -15,7 +14,7 @@ from notchflex.fit.objective import FitObjective, LeastSquares, noise_left
 from notchflex.fit.residuals import Samples
 from notchflex.fit.search import FitProblem, Minimum, Progress, search
 from notchflex.pieces import PieceFolder
-from notchflex.support import short_repr
+from notchflex.support import AnyPath, short_repr
 
 # How often noise and constants are estimated from each other.
 _ROUNDS = 10
@@ -35,7 +34,7 @@ def calibrate(
     intervals: bool = True,
     settings: Settings | None = None,
     progress: Progress | None = None,
-    folder: PieceFolder | str | os.PathLike[str] | None = None,
+    folder: PieceFolder | AnyPath | None = None,
 ) -> Calibration:
     """Fit constants of robots to measurements.
 
@@ -152,7 +151,7 @@ def fitted(
     seed: int,
     intervals: bool,
     progress: Progress | None = None,
-    folder: PieceFolder | str | os.PathLike[str] | None = None,
+    folder: PieceFolder | AnyPath | None = None,
 ) -> Calibration:
     """Fit a problem, its noise if unknown, and intervals; arguments as for `calibrate`.
 
@@ -169,7 +168,14 @@ def fitted(
     if not intervals or not calibration.is_likelihood:
         return calibration
     for number, unknown in enumerate(problem.unknowns, start=1):
-        calibration.intervals[unknown.name] = _interval(calibration, number - 1)
+        name = unknown.name
+        if calibration.tells_no_noise:
+            point = np.array([[calibration.values[name], 0.0]])
+            interval = Interval(None, None, point, "the noise is unknown")
+        else:
+            rise = calibration.allowed_rise(name)
+            interval = calibration.profile(name).interval(rise=rise, scale=unknown.scale)
+        calibration.intervals[name] = interval
         if progress is not None:
             progress("intervals", number, len(problem.unknowns))
     return calibration
@@ -208,11 +214,3 @@ def _with_noise(problem: FitProblem, best: Minimum) -> tuple[FitProblem, Minimum
         if np.allclose(problem.noise.deviation, noise.deviation, rtol=1e-3, atol=0.0):
             break
     return problem, best
-
-
-def _interval(calibration: Calibration, number: int) -> Interval:
-    name, scale = calibration.names[number], calibration.problem.unknowns[number].scale
-    if calibration.tells_no_noise:
-        point = np.array([[calibration.values[name], 0.0]])
-        return Interval(None, None, point, "the noise is unknown")
-    return calibration.profile(name).interval(rise=calibration.allowed_rise(name), scale=scale)

@@ -7,7 +7,6 @@ of an interval.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -24,6 +23,7 @@ from notchflex.fit.next_measurement import NextMeasurement
 from notchflex.fit.objective import LeastSquares, SumOfDistances, SumOfRobotErrors
 from notchflex.fit.posterior import Posterior
 from notchflex.support import (
+    AnyPath,
     check_folder,
     plain,
     robot_text,
@@ -315,7 +315,7 @@ def summary(fit: Calibration) -> str:
 
 
 def write_fitted(
-    found: Calibration, folder: str | os.PathLike[str], *, inputs: Iterable[str | Path] = ()
+    found: Calibration, folder: AnyPath, *, inputs: Iterable[str | Path] = ()
 ) -> tuple[Path, ...]:
     """Write every fitted robot as a robot file, named after its label.
 
@@ -342,7 +342,11 @@ def write_fitted(
     files = check_folder(str(folder), names, "the folder of fitted robots", inputs=inputs)
     targets = dict(zip(found.given, files, strict=True))
     for label, target in targets.items():
-        if target.exists() and _text(target) == source_of(found.given[label]):
+        try:
+            text = target.read_text(encoding="utf-8-sig")
+        except (OSError, ValueError):
+            continue
+        if text == source_of(found.given[label]):
             raise InputError.CONFLICT(
                 f"{target}: this would replace the file that {label} was read from; choose "
                 "another folder."
@@ -394,10 +398,3 @@ def _trust(fit: Calibration, unknown: Unknown) -> str:
     number = fit.number_of(unknown.name)
     pulls = f", by {fit.by_pulls.pulls[number]} whole pulls" * int(fit.by_pulls.counts[number])
     return f"{word}{' to '.join(ends)} {unit}".strip() + f" (95 %{pulls})"
-
-
-def _text(target: Path) -> str | None:
-    try:
-        return target.read_text(encoding="utf-8-sig")
-    except (OSError, ValueError):
-        return None

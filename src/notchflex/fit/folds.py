@@ -293,8 +293,17 @@ def leave_out(
         raise InputError.TOO_FEW_DATA(
             f"there is only one {by}; leaving it out leaves nothing to fit to"
         )
-    if photograph is not None:
-        _check_photograph(found, by, photograph)
+    if photograph is not None and not 0.0 < photograph <= 1.0:
+        raise InputError.OUT_OF_RANGE(
+            f"a photograph is at a part of the largest load, above 0 and up to 1; got {photograph}"
+        )
+    has_own = by == "robot" and any(unknown.each for unknown in found.problem.unknowns)
+    if photograph is not None and not has_own:
+        raise InputError.CONFLICT(
+            "one photograph updates constants that each robot has of its own, of a robot that was "
+            'left out: leave out by "robot", and fit one, such as each:sensor.force_factor with a '
+            "prior of 1 +- 0.05"
+        )
     folds: list[Fold] = []
     for number, (name, label, part, rest) in enumerate(parts, start=1):
         again, own = _without(found, rest, starts, seed)
@@ -306,19 +315,6 @@ def leave_out(
         if progress is not None:
             progress("leaving out", number, len(parts))
     return LeftOut(by, found, tuple(folds))
-
-
-def _check_photograph(calibration: Calibration, by: str, photograph: float) -> None:
-    if not 0.0 < photograph <= 1.0:
-        raise InputError.OUT_OF_RANGE(
-            f"a photograph is at a part of the largest load, above 0 and up to 1; got {photograph}"
-        )
-    if by != "robot" or not any(unknown.each for unknown in calibration.problem.unknowns):
-        raise InputError.CONFLICT(
-            "one photograph updates constants that each robot has of its own, of a robot that was "
-            'left out: leave out by "robot", and fit one, such as each:sensor.force_factor with a '
-            "prior of 1 +- 0.05"
-        )
 
 
 def _parts(data: Data, by: str) -> Iterator[tuple[str, str, list[Measurements], Data]]:

@@ -14,7 +14,6 @@ for equal weights too, where the printed form is 0 / 0.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -33,7 +32,7 @@ from notchflex.fit.scattered import (
     mean_interval,
     outliers,
 )
-from notchflex.support import DEGREES, read_data_table
+from notchflex.support import DEGREES, AnyPath, read_data_table
 
 Numbers = NDArray[np.float64]
 Law = Literal["capstan", "corner"]
@@ -280,7 +279,7 @@ class FrictionReadings:
 
 
 def read_friction_rig(
-    source: str | os.PathLike[str],
+    source: AnyPath,
     law: Law = "capstan",
     columns: Mapping[str, str] | None = None,
 ) -> FrictionReadings:

@@ -99,13 +99,28 @@ def next_measurement(
     """
     label = robot or next(iter(found.given))
     noise = dict(deviation or {})
-    _check(found, label, narrow, noise)
+    if label not in found.given:
+        raise InputError.UNKNOWN_NAME(
+            f"no robot of this fit is called {label}; there are {', '.join(found.given)}"
+        )
+    for name in narrow:
+        found.number_of(name)
+    if found.tells_no_noise:
+        raise InputError.TOO_FEW_DATA(
+            "the noise is unknown, so that the gain of another measurement is unknown; "
+            "measure more, or give standard deviations"
+        )
+    if any(not 0.0 < value < np.inf for value in noise.values()):
+        raise InputError.OUT_OF_RANGE("a deviation of the next measurement must be above 0")
     path = load_path(candidates, found.robots[label].number_of_tendons)
     measured = found.problem.samples.of_robot(label)
     if observed is None:
         observed = tuple(dict.fromkeys(name for one in measured for name in one.observed))
+    check_quantities(observed)
     for name in observed:
-        noise.setdefault(name, _noise_so_far(found, name))
+        so_far = found.noise.deviation[found.residuals.are(name)]
+        size = float(np.sqrt(np.mean(so_far**2))) if len(so_far) else float("nan")
+        noise.setdefault(name, size)
         if np.isnan(noise[name]):
             raise InputError.MISSING_VALUE(
                 f"{name} was not measured so far; give its standard deviation"
@@ -125,31 +140,6 @@ def next_measurement(
     return NextMeasurement(
         label, path, narrower, volume, found.names, tuple(narrow), np.isfinite(volume)
     )
-
-
-def _check(
-    calibration: Calibration, label: str, narrow: Sequence[str], deviation: Mapping[str, float]
-) -> None:
-    if label not in calibration.given:
-        raise InputError.UNKNOWN_NAME(
-            f"no robot of this fit is called {label}; there are {', '.join(calibration.given)}"
-        )
-    for name in narrow:
-        calibration.number_of(name)
-    if calibration.tells_no_noise:
-        raise InputError.TOO_FEW_DATA(
-            "the noise is unknown, so that the gain of another measurement is unknown; "
-            "measure more, or give standard deviations"
-        )
-    if any(not 0.0 < value < np.inf for value in deviation.values()):
-        raise InputError.OUT_OF_RANGE("a deviation of the next measurement must be above 0")
-
-
-def _noise_so_far(calibration: Calibration, name: str) -> float:
-    """Root mean square of the noise of a quantity; NaN if it was not measured."""
-    check_quantities([name])
-    deviation = calibration.noise.deviation[calibration.residuals.are(name)]
-    return float(np.sqrt(np.mean(deviation**2))) if len(deviation) else float("nan")
 
 
 def _solved(

@@ -115,21 +115,17 @@ class Sample:
         of_robot = [number for number, name in enumerate(names) if name not in SENSOR]
         made = changes(path, [names[number] for number in of_robot], along[:, of_robot])
         for name in SENSOR.keys() & numbers.keys():
+            # Packed loads are linear in tension and stroke.
+            command = SENSOR[name].command
+            value, step = getattr(load, command), 1.0 if name == "sensor.force_factor" else -1.0
+            moved = getattr(self._load({**numbers, name: numbers[name] + step}), command)
+            # Below 0 N the robot has no tension, whatever the sensor shows; strokes are released too.
+            acts = (command == "stroke") | (value > 0.0)
+            moved = replace(load, **{command: np.where(acts, moved, value)})
             for row in np.flatnonzero(along[:, names.index(name)]):
-                loads = Change(self._load_change(path, load, numbers, name), None)
-                made[row] = made[row].plus(loads, along[row, names.index(name)])
+                change = Change(step * load_change(path, moved), None)
+                made[row] = made[row].plus(change, along[row, names.index(name)])
         return made
-
-    def _load_change(
-        self, path: EquilibriumPath, load: LoadPath, numbers: Mapping[str, float], name: str
-    ) -> Numbers:
-        """Change of the packed loads, linear in tension and stroke, per unit of `name`."""
-        command = SENSOR[name].command
-        value, step = getattr(load, command), 1.0 if name == "sensor.force_factor" else -1.0
-        moved = getattr(self._load({**numbers, name: numbers[name] + step}), command)
-        # Below 0 N the robot has no tension, whatever the sensor shows; strokes are released too.
-        moved = np.where((command == "stroke") | (value > 0.0), moved, value)
-        return step * load_change(path, replace(load, **{command: moved}))
 
 
 @dataclass(frozen=True, eq=False)

@@ -257,7 +257,15 @@ class SearchTask(PieceTask):
 
     def __init__(self, problem: FitProblem, starts: int, seed: int) -> None:
         self.problem, self.starts, self.seed = problem, starts, seed
-        self.points = starting_points(problem, starts, seed)
+        # The robots as they are and, for several starts, candidates of Sobol's sequence.
+        start, first, last = np.array(
+            [(unknown.start, unknown.first, unknown.last) for unknown in problem.unknowns]
+        ).T
+        self.points = start[None]
+        if starts > 1:
+            sobol = qmc.Sobol(len(first), rng=np.random.default_rng(seed))
+            parts = sobol.random_base2(int(np.ceil(np.log2((starts - 1) * _CANDIDATES))))
+            self.points = np.concatenate([self.points, first + parts * (last - first)])
 
     @cached_property
     def manifest(self) -> Manifest:
@@ -357,18 +365,6 @@ def search(
         if len(minima) == starts:
             break
     return tuple(minima)
-
-
-def starting_points(problem: FitProblem, starts: int, seed: int) -> Float[np.ndarray, "s k"]:
-    """Return the robots as they are and, for several starts, candidates of Sobol's sequence."""
-    start, first, last = np.array(
-        [(unknown.start, unknown.first, unknown.last) for unknown in problem.unknowns]
-    ).T
-    if starts <= 1:
-        return start[None]
-    sobol = qmc.Sobol(len(first), rng=np.random.default_rng(seed))
-    parts = sobol.random_base2(int(np.ceil(np.log2((starts - 1) * _CANDIDATES))))
-    return np.concatenate([start[None], first + parts * (last - first)])
 
 
 def unit_free(curvature: Float[np.ndarray, "k k"]) -> tuple[Vector, Float[np.ndarray, "k k"]]:

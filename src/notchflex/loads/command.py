@@ -137,7 +137,7 @@ def body_wrench(rotation: Float[Array, "d d"], loads: BodyLoads) -> Float[Array,
 
 def is_unloaded(load_path: LoadPath) -> bool:
     """Return whether no external load acts in any step."""
-    return all(load is NOTHING or load.is_nothing for load in load_path.different)
+    return all(load.is_nothing for load in load_path.different)
 
 
 def follows(load_path: LoadPath) -> bool:
@@ -172,23 +172,14 @@ def _sideways(
     leaves = False
     normal = normal.tolist()
     for _, force, moment, point, following, _ in forces:
-        leaves |= _sticks_out(force, moment, point, normal if following else turned_normal, normal)
+        # A force or its point leaves the plane, or the axis of a moment is not its normal.
+        normal_of_load = normal if following else turned_normal
+        leaves |= (
+            (abs(_dot(force, normal_of_load)) > _ROUNDING * _norm(force))
+            | (_norm(_cross(moment, normal_of_load)) > _ROUNDING * _norm(moment))
+            | ((_norm(force) > 0.0) & (abs(_dot(point, normal)) > _ROUNDING * _norm(point)))
+        )
     return leaves
-
-
-def _sticks_out(
-    force: Sequence[Any],
-    moment: Sequence[Any],
-    point: Sequence[float],
-    normal: Sequence[float],
-    normal_of_body: Sequence[float],
-) -> Any:
-    """Return whether a force or its point leaves a plane, or a moment's axis is not its normal."""
-    return (
-        (abs(_dot(force, normal)) > _ROUNDING * _norm(force))
-        | (_norm(_cross(moment, normal)) > _ROUNDING * _norm(moment))
-        | ((_norm(force) > 0.0) & (abs(_dot(point, normal_of_body)) > _ROUNDING * _norm(point)))
-    )
 
 
 def _dot(first: Sequence[Any], second: Sequence[Any]) -> Any:

@@ -238,16 +238,12 @@ class ExternalLoad:
         return load
 
     @property
-    def pulls_down(self) -> bool:
-        """Whether gravity acts: given and not zero, or assumed for a mass at the tip."""
-        return self.tip_mass > 0.0 if self.gravity is None else any(self.gravity)
-
-    @property
     def is_nothing(self) -> bool:
         """Whether no load acts, whatever the robot weighs."""
-        acting = any(self.tip_force) or any(self.tip_moment) or self.pulls_down
-        acting = acting or self.temperature is not None
-        return not acting and not any(
+        # Gravity acts where it is given and not zero, or assumed for a mass at the tip.
+        pulls = self.tip_mass > 0.0 if self.gravity is None else any(self.gravity)
+        acting = pulls or any(self.tip_force) or any(self.tip_moment)
+        return not (acting or self.temperature is not None) and not any(
             any(load.force) or any(load.moment) for load in self.body_forces
         )
 
@@ -389,8 +385,15 @@ class Load(ExternalLoad):
         super().__post_init__()
         values = vars(self)
         for name in ("tension", "stroke"):
-            if values[name] is not None:
-                values[name] = _commanded(values[name], name)
+            value = values[name]
+            if hasattr(value, "__array__"):
+                value = np.asarray(value).tolist()
+            if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+                values[name] = tuple(
+                    None if each is None else _finite(each, name) for each in value
+                )
+            elif value is not None:
+                values[name] = _finite(value, name)
         if self.base_rotation is not NO_VECTOR:
             values["base_rotation"] = check_turn(self.base_rotation)
 
@@ -412,15 +415,6 @@ class Load(ExternalLoad):
                 f"give at most {tendons}"
             )
         return entries + (None,) * (tendons - len(entries))
-
-
-def _commanded(value: Any, what: str) -> float | tuple[float | None, ...]:
-    """Return a command as a finite number, or as one per tendon and None where there is none."""
-    if hasattr(value, "__array__"):
-        value = np.asarray(value).tolist()
-    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
-        return tuple(None if entry is None else _finite(entry, what) for entry in value)
-    return _finite(value, what)
 
 
 def _finite(value: Any, what: str, form: str = _PER_TENDON) -> float:

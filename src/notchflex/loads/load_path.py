@@ -567,27 +567,24 @@ def _ramp(what: str, start: Ends, stop: Ends, steps: int, tendon: int) -> LoadPa
         )
     commanded = np.full((steps, len(first)), np.nan)
     for number, ends in enumerate(zip(first, last, strict=True)):
-        if ends != (None, None):
-            commanded[:, number] = _column(what, ends, steps)
+        if ends == (None, None):
+            continue
+        begin, end = (
+            check_number(value, f"the {name} {what}")
+            for value, name in zip(ends, ("first", "last"), strict=True)
+        )
+        if steps == 1 and begin != end:
+            raise InputError.OUT_OF_RANGE(
+                f"a range of one step cannot go from {begin:g} to {end:g}; give 2 steps or more"
+            )
+        with np.errstate(over="ignore", invalid="ignore"):
+            commanded[:, number] = np.linspace(begin, end, steps)
+        if not np.isfinite(commanded[:, number]).all():
+            raise InputError.NOT_FINITE(
+                f"a {what} range needs finite ends; got {begin:g} and {end:g}"
+            )
     return LoadPath(commanded) if what == "tension" else LoadPath(stroke=commanded)
 
 
 def _is_several(value: Ends) -> TypeGuard[Sequence[float | None]]:
     return isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes)
-
-
-def _column(what: str, ends: tuple[Any, Any], steps: int) -> Float[np.ndarray, " s"]:
-    """Return the steps of one tendon."""
-    first, last = (
-        check_number(end, f"the {name} {what}")
-        for end, name in zip(ends, ("first", "last"), strict=True)
-    )
-    if steps == 1 and first != last:
-        raise InputError.OUT_OF_RANGE(
-            f"a range of one step cannot go from {first:g} to {last:g}; give 2 steps or more"
-        )
-    with np.errstate(over="ignore", invalid="ignore"):
-        commanded = np.linspace(first, last, steps)
-    if not np.isfinite(commanded).all():
-        raise InputError.NOT_FINITE(f"a {what} range needs finite ends; got {first:g} and {last:g}")
-    return commanded

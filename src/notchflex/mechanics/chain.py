@@ -601,6 +601,12 @@ def _template(
     free = Motion(free.rotation, free.translation + lead)
     sides = dict.fromkeys(notch.direction_deg for notch in notches)
     turns = {side: rotation_about(constant(TUBE_AXIS * xp.radians(side))) for side in sides}
+    # The squared motion of a notch's contact by its modes is over the stiffness a flexibility. A
+    # contact opposite a spine moves with its fibre; an edge contact by its distance from the tube
+    # axis times the rotation of the distal body.
+    fibre = xp.einsum("nc,nicm,ni->nm", fibre_stretch(rods.closure), rods.basis, rods.length)
+    turn = tube.outer_radius * (rods.start_rotation @ rods.turn[:, -1, :, 1:])[:, :2]
+    squared = xp.where(rods.has_closure[:, None] > 0.0, fibre**2, xp.sum(turn**2, axis=1))
     return ChainTemplate(
         distinct_rods,
         rod_index,
@@ -618,7 +624,7 @@ def _template(
         body_length,
         xp.stack([turns[notch.direction_deg] for notch in notches]),
         xp.sum(rods.length, axis=-1),
-        _squared_contact_motion(rods, tube.outer_radius),
+        squared * (1.0 - rods.padding_mask),
         factor,
     )
 
@@ -640,17 +646,6 @@ def _flat(chain: Chain, frame: Float[Array, "3 3"]) -> Chain:
         contact_pairs=tuple(map(planar, chain.contact_pairs)),
         frame=frame,
     )
-
-
-def _squared_contact_motion(rods: Rod, outer_radius: float) -> Float[Array, "n modes"]:
-    """Compute the squared motion of a notch's contact by its modes, mm²."""
-    # Over the stiffness it is a flexibility.
-    # A contact opposite a spine moves with its fibre; an edge contact by its distance from the tube
-    # axis times the rotation of the distal body.
-    fibre = xp.einsum("nc,nicm,ni->nm", fibre_stretch(rods.closure), rods.basis, rods.length)
-    turn = outer_radius * (rods.start_rotation @ rods.turn[:, -1, :, 1:])[:, :2]
-    squared = xp.where(rods.has_closure[:, None] > 0.0, fibre**2, xp.sum(turn**2, axis=1))
-    return squared * (1.0 - rods.padding_mask)
 
 
 def _contacts(groups: tuple[TendonGroup, ...], tendons: int) -> Int[Array, "t edges"]:

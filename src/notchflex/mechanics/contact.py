@@ -53,7 +53,6 @@ class EdgeContact(ContactGroup):
 
     def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
         """Compute the distance of the edge from the face, and the wrench of a unit normal force."""
-        del rod, flexure
         assert anchors is not None  # acts_on_bodies asks for it
 
         def press(anchor: Motion, leaves: Array, enters: Array, normal: Array) -> Any:

@@ -321,14 +321,6 @@ def arc_loads(arc: WallSector) -> tuple[Array, Array, Array]:
     return weak, strong, loads(even, 0.0 * even) / section.area
 
 
-def anchor_loads(arc: WallSector, radius: Array | float) -> Array:
-    """Expand the pull of a tendon that ends at the edge, opposite the arc, in harmonics."""
-    n = np.arange(HARMONICS)
-    pull = (-1.0) ** n / (arc.radius * EDGE_NORM)
-    nought = 0.0 * pull
-    return xp.stack([nought, nought, pull, -(radius - arc.radius) * pull], axis=-1)
-
-
 EDGE_NORM = np.pi * np.where(np.arange(HARMONICS) == 0, 2.0, 1.0)
 """Integrals of the squares of the harmonics around the tube."""
 
@@ -362,8 +354,10 @@ def end_compliance(
 
     # A tendon that ends there pulls the edge along: in the bending of the notch its pull counts as
     # a tension of the arc does.
-    anchored = 1.0 * (side.anchor > 0.0)
-    pull = anchored * anchor_loads(arc, side.anchor)
+    anchored, n = 1.0 * (side.anchor > 0.0), np.arange(HARMONICS)
+    at_edge = (-1.0) ** n / (arc.radius * EDGE_NORM)  # opposite the arc, in harmonics
+    nought, moment = 0.0 * at_edge, -(side.anchor - arc.radius) * at_edge
+    pull = anchored * xp.stack([nought, nought, at_edge, moment], axis=-1)
     relaxed = bound * np.where(np.arange(HARMONICS) < 2, 1.0, relaxation)
     by_weak = energy(weak, xp.stack([weak, axial]), relaxed) - energy(
         weak, xp.stack([0.0 * pull, pull]), bound

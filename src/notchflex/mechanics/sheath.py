@@ -17,6 +17,7 @@ from jaxtyping import Array, Float
 
 from notchflex._arrays import xp
 from notchflex._jax import Pytree, constant, jax, jnp
+from notchflex.mechanics.tendon import OfTendons
 from notchflex.robot import Tendon
 
 # Corners kept of a profile: 10 reversals within each other. One more drops the corner that changes
@@ -36,12 +37,12 @@ Corners = tuple[Float[Array, "t corners"], Float[Array, "t corners"]]
 class Sheath(Pytree):
     """Sheaths of t tendons; a tendon without one has 0 everywhere."""
 
-    friction: Float[Array, " t"]  # Coefficient of friction
-    bend: Float[Array, " t"]  # Total bend angle, rad
-    compliance: Float[Array, " t"]  # Stretch of wire and sheath under one tension all along, mm/N
-    backlash: Float[Array, " t"]  # Way of the drive on a reversal before the wire follows, mm
+    friction: OfTendons  # Coefficient of friction
+    bend: OfTendons  # Total bend angle, rad
+    compliance: OfTendons  # Stretch of wire and sheath under one tension all along, mm/N
+    backlash: OfTendons  # Way of the drive on a reversal before the wire follows, mm
 
-    def log_ratio(self, bend: Float[Array, ""]) -> Float[Array, " t"]:
+    def log_ratio(self, bend: Float[Array, ""]) -> OfTendons:
         """Return ln of the largest tension ratio over the sheaths; bent by a load from 0 rad on."""
         return self.friction * jnp.where(bend < 0.0, self.bend, bend)
 
@@ -51,11 +52,11 @@ class Sheath(Pytree):
         place = constant(np.tile(np.linspace(0.0, 1.0, _CORNERS), (len(none), 1)))
         return SheathMemory(none, place, 0.0 * place + np.log(_MIN_TENSION), none, none, none)
 
-    def wire_end(self, memory: SheathMemory) -> Float[Array, " t"]:
+    def wire_end(self, memory: SheathMemory) -> OfTendons:
         """Return the ways of the wires' ends at the drives, mm."""
         return memory.stroke + self.compliance * mean_tension((memory.place, memory.level))
 
-    def end_stretch(self, side: float, log_ratio: Array, tension: Array) -> Float[Array, " t"]:
+    def end_stretch(self, side: float, log_ratio: Array, tension: Array) -> OfTendons:
         """Return the stretch, mm, of a wire that slides all along toward drive (1) or base (-1)."""
         # The mean of exp over the profile: T (exp(c) - 1) / c while it is pulled.
         mean = jnp.exp(0.5 * side * log_ratio) * _relative_mean(0.5 * log_ratio)
@@ -100,12 +101,12 @@ def build_sheath(tendons: Sequence[Tendon]) -> Sheath | None:
     )
 
 
-def log_tension(tension: Float[Array, " t"]) -> Float[Array, " t"]:
+def log_tension(tension: OfTendons) -> OfTendons:
     """Return ln T, finite for slack wires."""
     return jnp.log(jnp.maximum(tension, 0.0) + _MIN_TENSION)
 
 
-def within(memory: SheathMemory, limit: Float[Array, " t"]) -> Corners:
+def within(memory: SheathMemory, limit: OfTendons) -> Corners:
     """Return the profiles, with a corner in each piece, where less friction lets the wire slide."""
     # From the drive on the line is the old one, but nowhere steeper than the friction holds: behind
     # a piece that is too steep it goes on with the slope that holds until it meets the old one.
@@ -127,7 +128,7 @@ def within(memory: SheathMemory, limit: Float[Array, " t"]) -> Corners:
     return place, level
 
 
-def from_drive(profile: Corners, end: Float[Array, " t"], limit: Float[Array, " t"]) -> Corners:
+def from_drive(profile: Corners, end: OfTendons, limit: OfTendons) -> Corners:
     """Return the profiles, with a corner more, after drives have brought ln T there to `end`."""
     # The line ln T = end -+ limit * place covers the profile up to where it meets it.
     place, level = profile
@@ -146,7 +147,7 @@ def from_drive(profile: Corners, end: Float[Array, " t"], limit: Float[Array, " 
     return jnp.concatenate([0.0 * front, place], 1), jnp.concatenate([end, level], 1)
 
 
-def from_base(profile: Corners, end: Float[Array, " t"], limit: Float[Array, " t"]) -> Corners:
+def from_base(profile: Corners, end: OfTendons, limit: OfTendons) -> Corners:
     """Return the profiles after the robot has brought ln T at the base to `end`."""
     place, level = from_drive(_reversed(profile), end, limit)
     return _reversed((place, level))
@@ -157,7 +158,7 @@ def _reversed(profile: Corners) -> Corners:
     return 1.0 - place[:, ::-1], level[:, ::-1]
 
 
-def mean_tension(profile: Corners, power: int = 1) -> Float[Array, " t"]:
+def mean_tension(profile: Corners, power: int = 1) -> OfTendons:
     """Return the mean of a power of the tension along the sheaths."""
     place, level = profile[0], power * profile[1]
     middle, half = 0.5 * (level[:, 1:] + level[:, :-1]), 0.5 * jnp.diff(level)

@@ -85,7 +85,6 @@ class AlongFibres(CrossingGroup):
 
     def cross(self, rod: Rod, flexure: FlexureState, anchors: Motion | None) -> Crossing:
         """Return the length of the fibres."""
-        del anchors
         weights = of_rod(rod, fibre_stretch(self.across))
         length = self.natural_gap + (rod.length @ flexure.strain) @ weights.T
         return Crossing(length, wrench=None, slope=fibre_slope(rod, weights))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,7 +17,7 @@ from scipy.optimize import approx_fprime, least_squares
 from notchflex import InputError
 from notchflex.photographs.edges import Contrast, Numbers
 from notchflex.photographs.outline import ViewPrior
-from notchflex.support import check_integer, check_number, need, write_text
+from notchflex.support import AnyPath, check_integer, check_number, need, write_text
 
 DICTIONARIES = (
     *(f"{bits}x{bits}_{count}" for bits in (4, 5, 6, 7) for count in (50, 100, 250, 1000)),
@@ -154,7 +153,7 @@ class Board:
         kind = "" if self.dictionary == "4x4_50" else f",dictionary={self.dictionary}"
         return f"{self.columns}x{self.rows},marker={self.marker:g},gap={self.gap:g}{kind}"
 
-    def write_svg(self, target: str | os.PathLike[str]) -> None:
+    def write_svg(self, target: AnyPath) -> None:
         """Write a drawing in its true size as SVG, for a printer; print it at 100 %.
 
         Raises:

@@ -263,18 +263,15 @@ def _slipped(fit: Fit) -> list[Fit]:
         (points, -pitch, side),
         (points[::-1], -height, -side),
     ):
-        both = on_axis_points(planar, _moved(chain, way))
+        # Farther along their line, which continues straight at both ends.
+        line = np.pad(chain, ((1, 1), (0, 0)), "reflect", reflect_type="odd")
+        along = np.cumsum(np.linalg.norm(np.diff(line, axis=0, prepend=line[:1]), axis=1))
+        moved = [np.interp(along[1:-1] + way, along, coordinate) for coordinate in line.T]
+        both = on_axis_points(planar, np.stack(moved, axis=1))
         numbers = next(view for view in both if hand * math.cos(view[4]) > 0.0)
         quick = refine(fit.model, fit.contrast, numbers, _FINE_REACHES, quick=True)
         fits.append(refine(fit.model, fit.contrast, quick.numbers, _LAST_REACHES))
     return fits
-
-
-def _moved(points: Numbers, way: float) -> Numbers:
-    """Return points farther along their line, which continues straight at both ends, px."""
-    line = np.pad(points, ((1, 1), (0, 0)), "reflect", reflect_type="odd")
-    along = np.cumsum(np.linalg.norm(np.diff(line, axis=0, prepend=line[:1]), axis=1))
-    return np.stack([np.interp(along[1:-1] + way, along, axis) for axis in line.T], axis=1)
 
 
 def _fine(model: OutlineModel, contrast: Contrast, coarse: list[Numbers]) -> list[Fit]:

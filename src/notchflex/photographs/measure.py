@@ -20,9 +20,9 @@ from notchflex.photographs.locating import Located, locate
 from notchflex.photographs.measured import MeasuredPhotograph, MeasuredPhotographs
 from notchflex.photographs.outline import PlanarRobot, axis_points
 from notchflex.photographs.reading import loads_of, read_photograph
-from notchflex.support import check_is_path, check_is_robot, check_number
+from notchflex.support import AnyPath, check_is_path, check_is_robot, check_number
 
-Photographs = Sequence[str | os.PathLike[str]] | str | os.PathLike[str]
+Photographs = Sequence[AnyPath] | AnyPath
 Progress = Callable[[str, int, int], None]
 
 MOST_PIXELS = 8.0e6
@@ -33,7 +33,7 @@ def measure(
     photographs: Photographs,
     robot: Robot,
     *,
-    loads: str | os.PathLike[str] | None = None,
+    loads: AnyPath | None = None,
     pattern: str | None = None,
     exif: bool = False,
     columns: Mapping[str, str] | None = None,

@@ -218,28 +218,24 @@ def measure_cut(
         >>> cut.write_robot("wrist-as-cut.toml")  # doctest: +SKIP
     """
     names = names_of(photographs)
-    turns = _turns(len(names), turn_deg)
-    planar, ruler = PlanarRobot(robot), Ruler(scale, board)
-    fits = [
-        fit_straight(picture, planar, name, ruler) for name, picture in pictures_of(names, progress)
-    ]
-    return combined(planar, fits, turns)
-
-
-def _turns(count: int, turn_deg: float | Sequence[float]) -> Numbers:
     form, given = "a number or a list of numbers", np.ravel(np.asarray(turn_deg, object))
     turns = np.array([check_number(turn, "turn_deg", form) for turn in given])
-    if len(turns) != count - 1:
+    if len(turns) != len(names) - 1:
         raise InputError.WRONG_SHAPE(
-            f"{count} photographs need {count - 1} turns, one for each after the first; got "
-            f"{turns.size}"
+            f"{len(names)} photographs need {len(names) - 1} turns, one for each after the first; "
+            f"got {turns.size}"
         )
     if not (np.abs(turns) <= MAX_TURN_DEG).all():
         raise InputError.OUT_OF_RANGE(
             f"turns must lie between -{MAX_TURN_DEG:g} and {MAX_TURN_DEG:g} deg, not "
             f"{', '.join(f'{turn:g}' for turn in turns)}"
         )
-    return np.radians(np.concatenate([[0.0], turns]))
+    turns = np.radians(np.concatenate([[0.0], turns]))
+    planar, ruler = PlanarRobot(robot), Ruler(scale, board)
+    fits = [
+        fit_straight(picture, planar, name, ruler) for name, picture in pictures_of(names, progress)
+    ]
+    return combined(planar, fits, turns)
 
 
 def combined(planar: PlanarRobot, fits: Sequence[StraightFit], turns: Numbers) -> MeasuredCut:

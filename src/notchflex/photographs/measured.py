@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import compress
@@ -16,7 +15,14 @@ from numpy.typing import NDArray
 from notchflex import InputError, Robot
 from notchflex.fit import MEASURED, deviation_header, headers
 from notchflex.photographs.edges import Numbers, made_smaller
-from notchflex.support import document_head, replacing, robot_text, write_columns, write_text
+from notchflex.support import (
+    AnyPath,
+    document_head,
+    replacing,
+    robot_text,
+    write_columns,
+    write_text,
+)
 
 PHOTOGRAPH = "photograph"
 """Column with the name of the file; `calibrate` passes over it."""
@@ -240,7 +246,7 @@ class MeasuredCut:
             }
         )
 
-    def write_robot(self, target: str | os.PathLike[str]) -> None:
+    def write_robot(self, target: AnyPath) -> None:
         """Write the robot as it was cut; comments name the photographs and standard deviations.
 
         Raises:

@@ -270,7 +270,12 @@ class OutlineModel:
         view = View(np.atleast_2d(numbers), planar.notches, factor)
         poses = planar.poses(view.angles)
         is_face, is_spine = self.kind == FACE, self.kind == SPINE
-        begin, end = (ends[:, self.ring] for ends in self._ends(view))
+        # Where the rings begin and end, along each from its start.
+        half = np.pad(0.5 * view.kerf, ((0, 0), (1, 1)))
+        begin = np.pad(view.moved[:, :-1], ((0, 0), (1, 0))) + half[:, :-1]
+        begin[:, 0] = -BASE * planar.outer
+        end = np.append(0.0, planar.uncut) + view.moved - half[:, 1:]
+        begin, end = begin[:, self.ring], end[:, self.ring]
         along = np.where(is_spine, 0.0, begin + (end - begin) * self._part)
         start, turned = (pose[:, self.ring] for pose in poses)
         start[:, is_spine], turned[:, is_spine] = self._spines(*poses)
@@ -299,13 +304,6 @@ class OutlineModel:
         room = _dot(first[self._facing] - first, normal)
         room[self._facing < 0] = np.inf
         return Outline(projected, normal, room, np.abs(inward))
-
-    def _ends(self, view: View) -> tuple[Numbers, Numbers]:
-        """Return where the rings begin and end, along each from its start, mm, (b, n + 1)."""
-        half = np.pad(0.5 * view.kerf, ((0, 0), (1, 1)))
-        begin = np.pad(view.moved[:, :-1], ((0, 0), (1, 0))) + half[:, :-1]
-        begin[:, 0] = -BASE * self.planar.outer
-        return begin, np.append(0.0, self.planar.uncut) + view.moved - half[:, 1:]
 
     def _spines(self, start: Numbers, turned: Numbers) -> tuple[Numbers, Numbers]:
         """Return where the points of spines lie on the tube axis, and its direction there."""

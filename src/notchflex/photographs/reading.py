@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from notchflex import InputError, Robot
 from notchflex.photographs.measured import PHOTOGRAPH
-from notchflex.support import bounded_bytes, need, read_data_table
+from notchflex.support import AnyPath, bounded_bytes, need, read_data_table
 
 MOST_PIXELS = 120e6
 """A picture of more pixels is not decoded."""
@@ -65,7 +65,7 @@ _LONGEST_SHAPE = 50
 _LEAST_SIDE = 64
 
 
-def read_photograph(source: str | os.PathLike[str]) -> NDArray[np.uint8]:
+def read_photograph(source: AnyPath) -> NDArray[np.uint8]:
     """Return a photograph as blue, green, red of 8 bits, (height, width, 3).
 
     Raises:
@@ -160,7 +160,7 @@ _PULL = re.compile(r"\bpull\s*=\s*(?P<pull>\w+)", re.IGNORECASE)
 def loads_of(
     names: Sequence[str],
     robot: Robot,
-    table: str | os.PathLike[str] | None,
+    table: AnyPath | None,
     pattern: str | None,
     exif: bool = False,
     columns: Mapping[str, str] | None = None,
@@ -195,7 +195,7 @@ def loads_of(
 
 
 def _from_table(
-    names: Sequence[str], source: str | os.PathLike[str], named: Mapping[str, str] | None
+    names: Sequence[str], source: AnyPath, named: Mapping[str, str] | None
 ) -> dict[str, tuple[str, ...]]:
     table = read_data_table(source, named)
     if PHOTOGRAPH not in table.header:

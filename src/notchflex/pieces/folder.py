@@ -22,6 +22,7 @@ from pydantic_core import to_jsonable_python
 
 from notchflex import InputError, __version__
 from notchflex.support import (
+    AnyPath,
     backend,
     check_folder,
     check_is_path,
@@ -83,7 +84,7 @@ class Manifest:
         return cls(to_jsonable_python(document, inf_nan_mode="strings", fallback=_plain))
 
     @classmethod
-    def read(cls, folder: str | os.PathLike[str], kind: str) -> Manifest:
+    def read(cls, folder: AnyPath, kind: str) -> Manifest:
         """Read the manifest of a folder.
 
         Raises:
@@ -174,7 +175,7 @@ class PieceTask:
 
 
 def check_target(
-    folder: str | os.PathLike[str], kind: str, option: str, inputs: Iterable[str | Path] = ()
+    folder: AnyPath, kind: str, option: str, inputs: Iterable[str | Path] = ()
 ) -> None:
     """Raise if pieces cannot be written into a folder; nothing is changed.
 
@@ -198,7 +199,7 @@ def check_target(
             )
 
 
-def open_folder(folder: str | os.PathLike[str], manifest: Manifest) -> None:
+def open_folder(folder: AnyPath, manifest: Manifest) -> None:
     """Make the folder of pieces, or check that it belongs to a manifest.
 
     Raises:
@@ -235,7 +236,7 @@ def _values(document: Any, path: str = "") -> dict[str, str]:
 
 
 @contextlib.contextmanager
-def locked(folder: str | os.PathLike[str], pieces: range) -> Generator[None]:
+def locked(folder: AnyPath, pieces: range) -> Generator[None]:
     """Keep other processes from some pieces; the system ends it with this process.
 
     Raises:
@@ -258,7 +259,7 @@ def locked(folder: str | os.PathLike[str], pieces: range) -> Generator[None]:
         yield
 
 
-def piece_file(folder: str | os.PathLike[str], piece: int) -> Path:
+def piece_file(folder: AnyPath, piece: int) -> Path:
     """Return the file of a piece."""
     return Path(folder) / _PIECES / f"piece-{piece:09d}.parquet"
 
@@ -290,7 +291,7 @@ def _checksum(data: memoryview) -> tuple[slice, bytes, bytes]:
     return place, there, b"%08x" % zlib.crc32(data)
 
 
-def write_piece(task: PieceTask, folder: str | os.PathLike[str], piece: int) -> tuple[int, int]:
+def write_piece(task: PieceTask, folder: AnyPath, piece: int) -> tuple[int, int]:
     """Work out a piece and write its file; return its number and its rows without a result.
 
     Raises:
@@ -302,7 +303,7 @@ def write_piece(task: PieceTask, folder: str | os.PathLike[str], piece: int) -> 
     return piece, sum(head["codes"][FAILED:])
 
 
-def stored_piece(folder: str | os.PathLike[str], manifest: Manifest, piece: int) -> int | None:
+def stored_piece(folder: AnyPath, manifest: Manifest, piece: int) -> int | None:
     """Return the rows without a result of a piece, None where its file is missing or damaged."""
     if (head := _head(folder, manifest, piece)) is None:
         return None
@@ -312,7 +313,7 @@ def stored_piece(folder: str | os.PathLike[str], manifest: Manifest, piece: int)
 
 
 def heads(
-    folder: str | os.PathLike[str], manifest: Manifest, needed: range | None = None
+    folder: AnyPath, manifest: Manifest, needed: range | None = None
 ) -> Iterator[dict[str, Any]]:
     """Yield the heads of pieces in their order: of those that are there, or of all that are needed.
 
@@ -328,7 +329,7 @@ def heads(
             )
 
 
-def _head(folder: str | os.PathLike[str], manifest: Manifest, piece: int) -> dict[str, Any] | None:
+def _head(folder: AnyPath, manifest: Manifest, piece: int) -> dict[str, Any] | None:
     """Return the head of a piece, None where its file is missing or damaged."""
     import polars
     from polars.exceptions import PolarsError

@@ -37,7 +37,7 @@ from notchflex.pieces.folder import (
     write_piece,
 )
 from notchflex.specification import whole
-from notchflex.support import check_is_path, need, on_cores
+from notchflex.support import AnyPath, check_is_path, need, on_cores
 
 T = TypeVar("T")
 
@@ -79,7 +79,7 @@ class PieceFolder:
         InputError: Workers or scheduler cannot be used, or an extra is missing.
     """
 
-    directory: str | os.PathLike[str]
+    directory: AnyPath
     workers: int | None = None
     scheduler: str | None = None
 
@@ -100,7 +100,7 @@ class PieceFolder:
                 )
 
     @classmethod
-    def of(cls, folder: PieceFolder | str | os.PathLike[str]) -> PieceFolder:
+    def of(cls, folder: PieceFolder | AnyPath) -> PieceFolder:
         """Return a folder, given as one or as its path."""
         return folder if isinstance(folder, PieceFolder) else cls(folder)
 

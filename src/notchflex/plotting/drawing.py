@@ -243,15 +243,6 @@ def _dimension(
     yield _stroke([first, last], width=0.7)
 
 
-def _broken(x: float, low: float, high: float) -> Iterator[Mark]:
-    """Yield the mark of an omitted part: a white band between two zigzag lines."""
-    y = np.linspace(low - 0.06, high + 0.06, 13)
-    aside = 0.035 * np.where(np.arange(13) % 2 == 0, -1.0, 1.0)
-    left, right = (np.column_stack([x + side + aside, y]) for side in (-0.035, 0.035))
-    yield Area([np.concatenate([left, right[::-1]])], "white", 1.0)
-    yield from (_stroke(left, INK), _stroke(right, INK))
-
-
 def dimensioned_figure(robot: Robot) -> Figure:
     """Draw the tube and every shape of notch with their dimensions, to scale [mm].
 
@@ -351,7 +342,17 @@ def notch_rows(robot: Robot, width: float = _WIDTH) -> tuple[list[NotchRow], lis
 def draw_row(axes: Axes, row: NotchRow, top: float) -> None:
     """Draw the views of one notch below a height."""
     axis = top - 0.62 - _LEVEL * len(row.along) - row.outer
-    draw_marks(axes, [label((0.25, top - 0.12), _heading(row), "left center", size=9.0, bold=True)])
+    notch, names = row.notch, shorten(row.names, 48, placeholder=" ...")
+    parts = (
+        f'{"notch" if names.isdigit() else "notches"} {names}: kind "{notch.kind}"',
+        f'cut "{notch.cut}"' if isinstance(notch, ArcNotch) else "",
+        f"bends toward {notch.direction_deg:g}°",
+        "base length 0" if row.held and not row.robot.tube.base_length else "",
+        "" if notch.uncut_length else "uncut length 0",
+        f"scale {scale_text(row.scale)}",
+    )
+    heading = ", ".join(filter(None, parts))
+    draw_marks(axes, [label((0.25, top - 0.12), heading, "left center", size=9.0, bold=True)])
     for view, left in (
         (_side_view, _LEFT),
         (_dimensions, _LEFT),
@@ -367,19 +368,6 @@ def _shifted(mark: Any, origin: Any) -> Any:
     if isinstance(mark, Note):
         return dataclasses.replace(mark, at=np.add(mark.at, origin))
     return dataclasses.replace(mark, points=np.add(mark.points, origin))
-
-
-def _heading(row: NotchRow) -> str:
-    notch, names = row.notch, shorten(row.names, 48, placeholder=" ...")
-    parts = (
-        f'{"notch" if names.isdigit() else "notches"} {names}: kind "{notch.kind}"',
-        f'cut "{notch.cut}"' if isinstance(notch, ArcNotch) else "",
-        f"bends toward {notch.direction_deg:g}°",
-        "base length 0" if row.held and not row.robot.tube.base_length else "",
-        "" if notch.uncut_length else "uncut length 0",
-        f"scale {scale_text(row.scale)}",
-    )
-    return ", ".join(filter(None, parts))
 
 
 def _dimensions(row: NotchRow) -> Iterator[Mark]:
@@ -433,8 +421,12 @@ def _side_view(row: NotchRow) -> Iterator[Mark]:
     for x, free in ((0.0, row.held), (length, row.tip)):
         if free:
             yield _ink([(x, -outer), (x, outer)])
-    for place in row.breaks:
-        yield from _broken(scale * place, -outer, outer)
+    for place in row.breaks:  # what is omitted: a white band between two zigzag lines
+        y = np.linspace(-outer - 0.06, outer + 0.06, 13)
+        aside = 0.035 * np.where(np.arange(13) % 2 == 0, -1.0, 1.0)
+        left, right = (np.column_stack([scale * place + x + aside, y]) for x in (-0.035, 0.035))
+        yield Area([np.concatenate([left, right[::-1]])], "white", 1.0)
+        yield from (_stroke(left, INK), _stroke(right, INK))
     if row.held:  # hatched, as what is fixed
         for y in np.arange(-outer, outer, 0.12):
             yield _ink([(-0.1, y), (0.0, y + 0.1)], 0.5)

@@ -233,7 +233,14 @@ def _robot_panels(fit: Calibration, label: str, notches: Mapping[int, Curve]) ->
 
     residuals, prefix = fit.residuals, f"{label}: " if len(fit.given) > 1 else ""
     of_robot = residuals.robot == list(fit.given).index(label)
-    x, x_label = _loads(fit, of_robot)
+    loads = [sample.measured.load for sample in fit.problem.samples.every]
+    rows = list(zip(residuals.sample[of_robot], residuals.row[of_robot], strict=True))
+    tension, stroke = (
+        np.array([getattr(loads[sample], name)[row] for sample, row in rows])
+        for name in ("tension", "stroke")
+    )
+    x = np.full(len(residuals), np.nan)
+    x[of_robot], x_label = _abscissa(tension, stroke)
     for quantity in OBSERVED:
         if quantity == "axis_points":  # thirty points and more: only their residuals
             continue
@@ -282,20 +289,6 @@ def _data_marks(fit: Calibration, quantity: str, shown: Any, x: Array) -> Iterat
                 points = np.stack([x[rows], measured], axis=1)[of_pull]
                 style: dict[str, Any] = {"marker": MARKERS[pull % len(MARKERS)], "hollow": True}
                 yield dots(points, GREY, 3.2, name=name, group=_MEASURED, layer=4, **style)
-
-
-def _loads(fit: Calibration, of_robot: Any) -> tuple[Array, str]:
-    """Return tension or stroke of a tendon at every residual of a robot, and its label."""
-    residuals = fit.residuals
-    loads = [sample.measured.load for sample in fit.problem.samples.every]
-    rows = list(zip(residuals.sample[of_robot], residuals.row[of_robot], strict=True))
-    tension, stroke = (
-        np.array([getattr(loads[sample], name)[row] for sample, row in rows])
-        for name in ("tension", "stroke")
-    )
-    x = np.full(len(residuals), np.nan)
-    x[of_robot], x_label = _abscissa(tension, stroke)
-    return x, x_label
 
 
 def _likelihood_panel(fit: Calibration, name: str) -> Panel:

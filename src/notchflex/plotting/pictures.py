@@ -156,11 +156,6 @@ def state_picture(path: EquilibriumPath, step: int, *, title: str | None = None)
     return Picture(path.robot.name if title is None else title, cells)
 
 
-def robot_picture(robot: Robot) -> Picture:
-    """Describe the picture of a robot without loads."""
-    return Picture(robot.name, stack([robot_shape(robot)]), row_height=6.0)
-
-
 def _angle_curve(path: EquilibriumPath, step: int, colour: Colour, **style: Any) -> Curve:
     """Return the angle of every notch in one state, base to tip."""
     angle = scaled(path, "notch_angle", path.notch_angle)[step]
@@ -320,7 +315,7 @@ def frames_of(path: EquilibriumPath) -> list[int]:
 
 # The class of a result, and what describes its picture: a class is loaded by who makes one.
 _KINDS: dict[str, Any] = {
-    "Robot": robot_picture,
+    "Robot": lambda robot: Picture(robot.name, stack([robot_shape(robot)]), row_height=6.0),
     "EquilibriumPath": path_picture,
     "Equilibrium": lambda state: state_picture(state.path, state.step),
     "Batch": batch_picture,

@@ -5,7 +5,7 @@ Batches, sweeps, tolerances, workspaces; designs, fronts, followed targets, sens
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -355,9 +355,17 @@ def workspace_picture(found: Workspace) -> Picture:
     panels = [_cloud(found, across)]
     for name, shown in maps.items():
         finite = np.isfinite(shown)
-        if finite.any():
-            items = list(_classes(voxels.centre[finite][:, [across, 2]], shown[finite], name))
-            panels.append(Panel(items, _LABELS[across], _LABELS[2], title=name, equal=True))
+        if not finite.any():
+            continue
+        points, shown = voxels.centre[finite][:, [across, 2]], shown[finite]
+        ends, items = np.linspace(shown.min(), shown.max(), _CLASSES + 1), list[Mark]()
+        number = np.digitize(shown, ends[1:-1])
+        for order, colour in enumerate(sequence_colours(_CLASSES)):
+            if len(mine := points[number == order]):
+                label = f"{ends[order]:.3g} to {ends[order + 1]:.3g}"
+                group = f"{name} {order}"
+                items.append(dots(mine, colour, 2.5, name=label, group=group, layer=2 + order))
+        panels.append(Panel(items, _LABELS[across], _LABELS[2], title=name, equal=True))
     return Picture(f"Workspace of {found.robot.name}", grid(panels, 3))
 
 
@@ -432,17 +440,6 @@ def _cloud(workspace: Workspace, across: int) -> Panel:
         items.append(Curve(ring, SKY, width=1.0, name="convex hull"))
     title = f"convex hull {hull.size:.3g} {hull.unit}"
     return Panel(items, *(_LABELS[axis] for axis in axes), title=title, equal=True)
-
-
-def _classes(points: Array, values: Array, name: str) -> Iterator[Mark]:
-    """Yield voxels (across, z) in a few classes of values of equal width."""
-    ends = np.linspace(values.min(), values.max(), _CLASSES + 1)
-    number = np.digitize(values, ends[1:-1])
-    for order, colour in enumerate(sequence_colours(_CLASSES)):
-        if len(mine := points[number == order]):
-            label = f"{ends[order]:.3g} to {ends[order + 1]:.3g}"
-            group = f"{name} {order}"
-            yield dots(mine, colour, 2.5, name=label, group=group, layer=2 + order)
 
 
 _BEFORE, _AFTER = GREY, BLUE
@@ -607,15 +604,21 @@ def sensed_picture(sensed: SensedForce, *, truth: Any = None) -> Picture:
         'force along x [N]'
     """
     x = np.arange(1.0, len(sensed) + 1.0)
-    panels = [
-        Panel(
-            _component(sensed, which, x, None if truth is None else np.asarray(truth)[:, which]),
-            _READING,
-            f"force along {name} [N]",
-            whole="x",
-        )
-        for which, name in enumerate(sensed.components)
-    ]
+    panels: list[Panel] = []
+    for which, name in enumerate(sensed.components):
+        force, low, high = sensed.force[:, which], sensed.low[:, which], sensed.high[:, which]
+        spread = np.minimum(1.96 * sensed.deviation[:, which], sensed.largest)
+        marks: list[Mark] = [
+            band(x, low, high, ORANGE, 0.3, name="noise and stuck friction"),
+            band(x, force - spread, force + spread, BLUE, 0.25, name="noise alone, to first order"),
+            line(x, force, BLUE, name="sensed", marker="o"),
+        ]
+        if truth is not None:
+            marks.append(line(x, np.asarray(truth)[:, which], BLACK, DASHED, name="true"))
+        if sensed.contact.any():
+            points = np.stack([x, force], axis=1)[sensed.contact]
+            marks.append(dots(points, GREEN, 5.0, name="contact shown", layer=5))
+        panels.append(Panel(marks, _READING, f"force along {name} [N]", whole="x"))
     if sensed.path is not None:  # the best history
         tension = sensed.path.tension[sensed.group[sensed.converged]]
         items = entry_lines(x[: len(tension)], tension, "tendon", marker="o")
@@ -623,20 +626,3 @@ def sensed_picture(sensed: SensedForce, *, truth: Any = None) -> Picture:
     where = "the tip" if sensed.place is None else f"body {sensed.place}"
     title = f"Force on {where} of {sensed.robot.name}"
     return Picture(title, stack(panels), column_width=6.4, row_height=2.5)
-
-
-def _component(sensed: SensedForce, which: int, x: Array, truth: Any) -> list[Mark]:
-    force, low, high = sensed.force[:, which], sensed.low[:, which], sensed.high[:, which]
-    spread = np.minimum(1.96 * sensed.deviation[:, which], sensed.largest)
-    ends = force - spread, force + spread
-    items: list[Mark] = [
-        band(x, low, high, ORANGE, 0.3, name="noise and stuck friction"),
-        band(x, *ends, BLUE, 0.25, name="noise alone, to first order"),
-        line(x, force, BLUE, name="sensed", marker="o"),
-    ]
-    if truth is not None:
-        items.append(line(x, truth, BLACK, DASHED, name="true"))
-    if sensed.contact.any():
-        points = np.stack([x, force], axis=1)[sensed.contact]
-        items.append(dots(points, GREEN, 5.0, name="contact shown", layer=5))
-    return items

@@ -19,7 +19,7 @@ from notchflex import __version__
 from notchflex._imports import need
 from notchflex._jax import jax
 from notchflex._quantity import REGISTERED, Quantity
-from notchflex._replacing import replacing
+from notchflex._replacing import AnyPath, replacing
 from notchflex.errors import ErrorCode, InputError
 from notchflex.results.quantities import AXES, CONTACT_STATES, QUANTITIES
 from notchflex.results.state import leaves_of
@@ -37,7 +37,7 @@ READ_BACK = "read_back"
 """Key of a JSON document under which the exact numbers stand."""
 
 
-def save_path(path: EquilibriumPath, file: str | FilePath) -> None:
+def save_path(path: EquilibriumPath, file: AnyPath) -> None:
     """Write a path to a file; by its suffix as JSON, NetCDF, Parquet or CSV.
 
     JSON, NetCDF and Parquet hold the whole path, and `read_path` makes an equal one of them. CSV
@@ -74,7 +74,7 @@ def save_path(path: EquilibriumPath, file: str | FilePath) -> None:
             raise _unknown_suffix(file, "written")
 
 
-def read_path(file: str | FilePath) -> EquilibriumPath:
+def read_path(file: AnyPath) -> EquilibriumPath:
     """Read a path back from a file; it equals the one that was written, its states too.
 
     Nothing is solved: every number is that of the file. A simulation continues from `.state` as
@@ -120,7 +120,7 @@ def whole_document(path: EquilibriumPath) -> dict[str, Any]:
     return {**path_document(path), READ_BACK: encoded(path)}
 
 
-def _read_json(file: str | FilePath) -> EquilibriumPath:
+def _read_json(file: AnyPath) -> EquilibriumPath:
     try:
         document = json.loads(FilePath(file).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as problem:
@@ -154,7 +154,7 @@ def _same_steps(path: EquilibriumPath, steps: Any) -> bool:
     )
 
 
-def _unknown_suffix(file: str | FilePath, done: str) -> InputError:
+def _unknown_suffix(file: AnyPath, done: str) -> InputError:
     return InputError.FILE_FORMAT(
         f"{file}: got {suffix_of(file)}; a path is {done} as .json, .nc, .parquet or .csv."
     )
@@ -243,7 +243,7 @@ def encoded(path: EquilibriumPath) -> dict[str, Any]:
     return {"facts": facts_of(path), "arrays": arrays}
 
 
-def _decoded(document: Any, source: str | FilePath) -> EquilibriumPath:
+def _decoded(document: Any, source: AnyPath) -> EquilibriumPath:
     """Return the path that `encoded` was given."""
     with _damage(source):
         arrays = {
@@ -256,7 +256,7 @@ def _decoded(document: Any, source: str | FilePath) -> EquilibriumPath:
 
 
 @contextlib.contextmanager
-def _damage(source: str | FilePath) -> Generator[None]:
+def _damage(source: AnyPath) -> Generator[None]:
     """Tell what prevents that a path is made of what a file holds."""
     try:
         yield
@@ -274,7 +274,7 @@ def _damage(source: str | FilePath) -> Generator[None]:
 
 
 def _path_of(
-    facts: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], source: str | FilePath
+    facts: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], source: AnyPath
 ) -> EquilibriumPath:
     """Return the path of facts and arrays that were read from a file."""
     from notchflex.loads import BodyForce, ExternalLoad, LoadPath
@@ -371,7 +371,7 @@ def frame(columns: Mapping[str, Any], library: str) -> Any:
     return import_module("pandas").DataFrame(columns)
 
 
-def write_parquet(target: str | FilePath, path: EquilibriumPath) -> None:
+def write_parquet(target: AnyPath, path: EquilibriumPath) -> None:
     """Write a path as a Parquet table, one row a step, units in the names of the columns.
 
     Raises:
@@ -386,13 +386,13 @@ def write_parquet(target: str | FilePath, path: EquilibriumPath) -> None:
         temporary.write_bytes(buffer.getbuffer())
 
 
-def read_columns(file: str | FilePath) -> Mapping[str, Sequence[Any]]:
+def read_columns(file: AnyPath) -> Mapping[str, Sequence[Any]]:
     """Return the columns of a Parquet table."""
     with _reading(file) as polars:
         return polars.read_parquet(FilePath(file)).to_dict(as_series=False)
 
 
-def _read_parquet(file: str | FilePath) -> EquilibriumPath:
+def _read_parquet(file: AnyPath) -> EquilibriumPath:
     """Return the path in the head of a Parquet table."""
     with _reading(file) as polars:
         head = polars.read_parquet_metadata(FilePath(file))
@@ -407,7 +407,7 @@ def _read_parquet(file: str | FilePath) -> EquilibriumPath:
 
 
 @contextlib.contextmanager
-def _reading(file: str | FilePath) -> Generator[Any]:
+def _reading(file: AnyPath) -> Generator[Any]:
     """Yield polars; what it raises for a file that it cannot read becomes an `InputError`."""
     need("polars", "data", "Parquet")
     import polars
@@ -465,7 +465,7 @@ def dataset_of(path: EquilibriumPath) -> Dataset:
     )
 
 
-def write_netcdf(target: str | FilePath, path: EquilibriumPath) -> None:
+def write_netcdf(target: AnyPath, path: EquilibriumPath) -> None:
     """Write a path as NetCDF: what `to_xarray` has, and the rest of its record in a group.
 
     Raises:
@@ -484,7 +484,7 @@ def write_netcdf(target: str | FilePath, path: EquilibriumPath) -> None:
     write_groups(target, {None: dataset_of(path), _GROUP: group})
 
 
-def write_groups(target: str | FilePath, groups: Mapping[str | None, Dataset]) -> None:
+def write_groups(target: AnyPath, groups: Mapping[str | None, Dataset]) -> None:
     """Write data sets as the groups of one NetCDF file, whole or not at all.
 
     The file is made in memory: HDF5 itself ends the process where a disk is full.
@@ -503,7 +503,7 @@ def write_groups(target: str | FilePath, groups: Mapping[str | None, Dataset]) -
         temporary.write_bytes(buffer.getbuffer())
 
 
-def _read_netcdf(file: str | FilePath) -> EquilibriumPath:
+def _read_netcdf(file: AnyPath) -> EquilibriumPath:
     """Return the path of a file that `write_netcdf` wrote."""
     _need_netcdf()
     import xarray

@@ -107,8 +107,13 @@ MOMENT_ERROR = 0.01
 
 def path_warnings(path: EquilibriumPath) -> list[str]:
     """Return one sentence for each reason to doubt a path."""
+    strains = [
+        warning
+        for material in dict.fromkeys(path.robot.materials[1:])
+        for warning in _strains_of(path, material)
+    ]
     outside = unchecked_dimensions(path.robot)
-    return [*outside, *_snaps(path), *_strains(path), *_unstable(path), *_coarse(path)]
+    return [*outside, *_snaps(path), *strains, *_unstable(path), *_coarse(path)]
 
 
 def _snaps(path: EquilibriumPath) -> Iterator[str]:
@@ -123,11 +128,6 @@ def _snaps(path: EquilibriumPath) -> Iterator[str]:
                 "closes, so that no shape between is in equilibrium under this tension; prescribe "
                 "the stroke to pass through the shapes between."
             )
-
-
-def _strains(path: EquilibriumPath) -> Iterator[str]:
-    for material in dict.fromkeys(path.robot.materials[1:]):
-        yield from _strains_of(path, material)
 
 
 def _strains_of(path: EquilibriumPath, material: Material) -> Iterator[str]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from notchflex._quantity import Quantity
+from notchflex._replacing import AnyPath
 from notchflex.errors import InputError
 from notchflex.results.io import read_columns
 from notchflex.results.quantities import AXES, QUANTITIES
@@ -47,17 +48,14 @@ def no_tendon_column(table: Table, tendons: int) -> InputError:
     label = "" if tendons == 1 else 1
     columns = [QUANTITIES[q].header(tendon=label) for q in ("tension", "stroke")]
     more = "" if tendons == 1 else f" (and so on to tendon {tendons})"
-    return InputError.TABLE_COLUMNS(
-        f"{table.name}: there is no column {columns[0]} or {columns[1]}{more}; {table.columns}. "
-        f'Say which it is: --column tension="{_likely(table)}".'
-    )
-
-
-def _likely(table: Table) -> str:
-    """Return the header that a tension most likely has: of its unit, or the first."""
+    # A tension most likely has a header of its unit, or the first.
     forces = (name for name in table.header if re.search(r"(^|[^A-Za-z])N$", name.rstrip(")] ")))
     header = next(forces, table.header[0])
-    return table.written.get(header, header)
+    likely = table.written.get(header, header)
+    return InputError.TABLE_COLUMNS(
+        f"{table.name}: there is no column {columns[0]} or {columns[1]}{more}; {table.columns}. "
+        f'Say which it is: --column tension="{likely}".'
+    )
 
 
 _UNITS = {
@@ -84,9 +82,7 @@ _PLAIN = re.compile(r"photograph|pull|trial|from_rest|tip_direction_[xyz]")
 _WORDS = {word: column for column, words in _QUANTITIES.items() for word in words}
 
 
-def read_data_table(
-    source: str | os.PathLike[str], columns: Mapping[str, str] | None = None
-) -> Table:
+def read_data_table(source: AnyPath, columns: Mapping[str, str] | None = None) -> Table:
     """Read a table whose headers may be in other words or units.
 
     Args:
@@ -171,7 +167,7 @@ Asked = TypeVar("Asked")
 
 
 def read_specification(
-    path: str | os.PathLike[str], kind: str, make: Callable[[Mapping[str, Any]], Asked]
+    path: AnyPath, kind: str, make: Callable[[Mapping[str, Any]], Asked]
 ) -> Asked:
     """Read a file and make what it asks.
 
@@ -224,7 +220,7 @@ _PATTERNS = {
 }
 
 
-def read_table(file: str | Path) -> dict[str, NDArray[Any]]:
+def read_table(file: AnyPath) -> dict[str, NDArray[Any]]:
     """Read a table that was written of a path, as its quantities in mm, N and rad.
 
     A table holds every step as it was printed, so angles come back to the last digit or two. What
@@ -270,7 +266,14 @@ def read_table(file: str | Path) -> dict[str, NDArray[Any]]:
             f"{file} has no column of a path (such as {QUANTITIES['total_angle'].header()}); give "
             "a table that --csv or --parquet wrote."
         )
-    return {name: _joined(QUANTITIES[name], parts) for name, parts in entries.items()}
+    arrays: dict[str, NDArray[Any]] = {}
+    for name, parts in entries.items():
+        first, shape = next(iter(parts.values())), np.max(list(parts), axis=0) + 1
+        empty = np.nan if first.dtype.kind == "f" else 0
+        arrays[name] = np.full((len(first), *shape), empty, first.dtype)
+        for index, values in parts.items():
+            arrays[name][(slice(None), *index)] = values
+    return arrays
 
 
 def _place(header: str) -> tuple[Quantity, tuple[int, ...]] | None:
@@ -301,15 +304,3 @@ def _numbers(quantity: Quantity, values: Sequence[Any]) -> NDArray[Any]:
     if quantity.kind is bool:
         return numbers != 0.0
     return numbers.astype(int) if quantity.kind is int else numbers / quantity.scale
-
-
-def _joined(quantity: Quantity, parts: Mapping[tuple[int, ...], NDArray[Any]]) -> NDArray[Any]:
-    if not quantity.per:
-        return parts[()]
-    first = next(iter(parts.values()))
-    shape = np.max(list(parts), axis=0) + 1
-    empty = np.nan if first.dtype.kind == "f" else 0
-    array = np.full((len(first), *shape), empty, first.dtype)
-    for index, values in parts.items():
-        array[(slice(None), *index)] = values
-    return array

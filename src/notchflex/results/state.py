@@ -7,14 +7,13 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from operator import attrgetter
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, overload
 
 import jax.tree_util as tree_util
 import numpy as np
 from jaxtyping import Float, Int
 
-from notchflex._replacing import replacing
+from notchflex._replacing import AnyPath, replacing
 from notchflex._summary import MOST, Displayed, Summary, course, short, vector
 from notchflex._values import ByValue
 from notchflex.errors import ConvergenceError, InputError
@@ -133,7 +132,7 @@ class State(ByValue, Displayed):
     def _value(self) -> Any:
         return (self.robot, self.arrays, self.level, self.loaded, self.refinement)
 
-    def save(self, path: str | FilePath) -> None:
+    def save(self, path: AnyPath) -> None:
         """Write the state to a JSON file.
 
         Args:
@@ -163,7 +162,7 @@ class State(ByValue, Displayed):
         return bool(np.any(self.arrays.get(f"{_LOADS}.following", 0.0)))
 
     @classmethod
-    def load(cls, path: str | FilePath) -> State:
+    def load(cls, path: AnyPath) -> State:
         """Read a state back; it is fitted to a robot when it is continued from.
 
         Args:
@@ -201,7 +200,14 @@ class State(ByValue, Displayed):
                 robot = robot_from_text(str(robot))
             except InputError:
                 raise _damaged(path, "the description of its robot cannot be read") from None
-        read = {name: _array(path, name, numbers) for name, numbers in arrays.items()}
+        read: dict[str, np.ndarray] = {}
+        for name, numbers in arrays.items():
+            try:
+                read[name] = np.asarray(numbers, float)
+            except (TypeError, ValueError, OverflowError):
+                raise _damaged(path, f"{name} is not a table of numbers") from None
+            if not np.isfinite(read[name]).all():
+                raise _damaged(path, f"{name} holds what is not a finite number")
         return cls(**facts, arrays=read, description=robot, source=str(path))
 
     def fitted(self, chain: Chain) -> SolverState:
@@ -255,18 +261,7 @@ def _in_space(solved: SolverState, chain: Chain, *, reduce: bool = False) -> Sol
     return solved._replace(applied=in_space(solved.applied, chain.frame, reduce=reduce))
 
 
-def _array(source: str | FilePath, name: str, numbers: Any) -> np.ndarray:
-    """Return numbers of a file as an array."""
-    try:
-        array = np.asarray(numbers, float)
-    except (TypeError, ValueError, OverflowError):
-        raise _damaged(source, f"{name} is not a table of numbers") from None
-    if not np.isfinite(array).all():
-        raise _damaged(source, f"{name} holds what is not a finite number")
-    return array
-
-
-def _damaged(source: str | FilePath, what: str) -> InputError:
+def _damaged(source: AnyPath, what: str) -> InputError:
     return InputError.FILE_DAMAGED(
         f"the state file {source} is damaged: {what}; save the state again"
     )

@@ -19,6 +19,7 @@ import numpy as np
 
 from notchflex import __version__
 from notchflex._quantity import Quantity
+from notchflex._replacing import AnyPath
 from notchflex.results.quantities import (
     AXES,
     CONTACT_STATES,
@@ -33,8 +34,6 @@ from notchflex.robot import Robot
 from notchflex.robot.robot import to_table
 
 if TYPE_CHECKING:
-    from pathlib import Path as FilePath
-
     from notchflex.results.path import EquilibriumPath
 
 
@@ -48,7 +47,7 @@ def path_columns(path: EquilibriumPath) -> dict[str, Sequence[Any]]:
 
 
 def write_path_csv(
-    target: str | FilePath, path: EquilibriumPath, more: Mapping[str, Sequence[Any]] | None = None
+    target: AnyPath, path: EquilibriumPath, more: Mapping[str, Sequence[Any]] | None = None
 ) -> None:
     """Write a path as CSV to a file, whole or not at all, or to standard output for `-`.
 
@@ -63,7 +62,7 @@ def write_path_csv(
     write_columns(target, {**path_columns(path), **(more or {})})
 
 
-def write_columns(target: str | FilePath, columns: Mapping[str, Iterable[Any]]) -> None:
+def write_columns(target: AnyPath, columns: Mapping[str, Iterable[Any]]) -> None:
     """Write columns as CSV, as `write_csv` does its rows.
 
     Args:
@@ -76,7 +75,7 @@ def write_columns(target: str | FilePath, columns: Mapping[str, Iterable[Any]]) 
     write_csv(target, list(columns), zip(*columns.values(), strict=True))
 
 
-def write_csv(target: str | FilePath, header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
+def write_csv(target: AnyPath, header: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
     """Write rows as CSV (UTF-8, comma, header first); NaN and None become empty fields.
 
     Args:
@@ -202,7 +201,7 @@ def json_text(document: Any) -> str:
     return json.dumps(plain(document), ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def write_json(target: str | FilePath, document: Any) -> None:
+def write_json(target: AnyPath, document: Any) -> None:
     """Write a document to a file, whole or not at all, or to standard output for `-`.
 
     Raises:
@@ -239,10 +238,25 @@ def _step(path: EquilibriumPath, index: int, external: list[dict[str, Any]]) -> 
             *outer, last = quantity.key.split(".")
             for key in outer:
                 holder = holder.setdefault(key, {})
-            holder[last] = _value(path, quantity, index)
+            value = getattr(path, quantity.name)[index]
+            if quantity.per == ("tendon", "span"):
+                value = [row[: spans_of(path, tendon)] for tendon, row in enumerate(value)]
+            elif quantity.scale != 1.0:
+                value = np.asarray(value) * quantity.scale
+            holder[last] = value.item() if isinstance(value, np.generic) else value
     if external:
         step.setdefault("load", {}).update(external[index])
-    step["contacts"] = [_contacts(path, tendon, index) for tendon in range(path.tension.shape[1])]
+    step["contacts"] = []
+    for tendon in range(path.tension.shape[1]):
+        count = spans_of(path, tendon) - 1
+        columns = {
+            q.key.split(".")[1]: getattr(path, q.name)[index, tendon, :count] * q.scale
+            for q in CONTACTS
+            if holds(path, q)
+        }
+        columns["state"] = [CONTACT_STATES[int(state)] for state in columns["state"]]
+        contacts = [{key: each[number] for key, each in columns.items()} for number in range(count)]
+        step["contacts"].append(contacts)
     return step
 
 
@@ -261,23 +275,3 @@ def _with_units(values: dict[str, Any]) -> dict[str, Any]:
         )
         for name, value in values.items()
     }
-
-
-def _value(path: EquilibriumPath, quantity: Quantity, index: int) -> Any:
-    value = getattr(path, quantity.name)[index]
-    if quantity.per == ("tendon", "span"):
-        return [row[: spans_of(path, tendon)] for tendon, row in enumerate(value)]
-    if quantity.scale != 1.0:
-        return np.asarray(value) * quantity.scale
-    return value.item() if isinstance(value, np.generic) else value
-
-
-def _contacts(path: EquilibriumPath, tendon: int, index: int) -> list[dict[str, Any]]:
-    count = spans_of(path, tendon) - 1
-    columns = {
-        q.key.split(".")[1]: getattr(path, q.name)[index, tendon, :count] * q.scale
-        for q in CONTACTS
-        if holds(path, q)
-    }
-    columns["state"] = [CONTACT_STATES[int(state)] for state in columns["state"]]
-    return [{key: column[contact] for key, column in columns.items()} for contact in range(count)]

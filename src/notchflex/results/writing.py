@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TextIO
 
 from notchflex._imports import need
-from notchflex._replacing import is_replaceable, replacing, unwritable
+from notchflex._replacing import AnyPath, is_replaceable, replacing, unwritable
 from notchflex.errors import InputError
 
 
@@ -60,7 +60,7 @@ _DRAWN_BY = {".html": ("matplotlib", "plotly"), ".gif": ("matplotlib", "PIL")}
 """What has to be installed for a kind of picture, where that is more than matplotlib."""
 
 
-def check_output(target: str, option: str, *, inputs: Iterable[str | Path] = ()) -> None:
+def check_output(target: str, option: str, *, inputs: Iterable[AnyPath] = ()) -> None:
     """Raise if a file cannot be written at `target`; nothing is created or changed.
 
     Args:
@@ -108,7 +108,7 @@ def _obstacle(path: Path) -> str:
 
 
 def check_folder(
-    folder: str, names: Iterable[str], option: str, *, inputs: Iterable[str | Path] = ()
+    folder: str, names: Iterable[str], option: str, *, inputs: Iterable[AnyPath] = ()
 ) -> tuple[Path, ...]:
     """Raise if files cannot be written in a folder, which may be missing; nothing is changed.
 
@@ -149,7 +149,7 @@ def check_picture(
     target: str,
     option: str,
     *,
-    inputs: Iterable[str | Path] = (),
+    inputs: Iterable[AnyPath] = (),
     kinds: tuple[str, ...] = PAPER + BROWSER,
 ) -> None:
     """Raise if a picture cannot be written at `target`: as `check_output`, and its kind too.
@@ -179,7 +179,7 @@ def check_picture(
         need(module, "plot", option)
 
 
-def suffix_of(file: str | Path) -> str:
+def suffix_of(file: AnyPath) -> str:
     """Return what suffix a file has, in words."""
     suffix = Path(file).suffix.lower()
     return f"the suffix {suffix}" if suffix else "no suffix"
@@ -209,7 +209,7 @@ def check_distinct(outputs: dict[str, str | None]) -> None:
         seen[name] = option
 
 
-def write_text(target: str | Path, text: str) -> None:
+def write_text(target: AnyPath, text: str) -> None:
     """Write UTF-8 text to a file, whole or not at all, or to standard output for `-`.
 
     Args:

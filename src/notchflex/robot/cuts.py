@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from notchflex.errors import InputError
 
@@ -54,10 +54,10 @@ class CutLayout(NamedTuple):
     length: float
 
 
-def whole_gap(outer: float, direction_deg: float, length: float, uncut: float) -> CutLayout:
+def whole_gap(notch: Any, outer: float) -> CutLayout:
     """Return the layout of a gap that leaves nothing of a tube of an outer radius, mm."""
-    gap = slot(direction_deg, (0.0, length), -1.5 * outer, outer)
-    return CutLayout((gap,), length + uncut)
+    gap = slot(notch.direction_deg, (0.0, notch.length), -1.5 * outer, outer)
+    return CutLayout((gap,), notch.length + notch.uncut_length)
 
 
 def slot(
@@ -181,7 +181,20 @@ def pieces(
     for before, corner, after, radius, sharp in zip(
         corners[:-2], corners[1:-1], corners[2:], radii[1:-1], moved[1:-1], strict=True
     ):
-        tangent, arc = _fillet(before, corner, after, radius, inside)
+        # The length that a fillet takes of both lines, and its arc; none where it is sharp.
+        tangent, arc = 0.0, None
+        first = math.atan2(corner[1] - before[1], corner[0] - before[0])
+        second = math.atan2(after[1] - corner[1], after[0] - corner[0])
+        turn = math.remainder(second - first, math.tau)
+        if radius > 0.0 and turn != 0.0:
+            tangent = radius * math.tan(0.5 * abs(turn))
+            side = math.copysign(1.0, turn)  # of the centre: left of the line for a left turn
+            start = corner[0] - tangent * math.cos(first), corner[1] - tangent * math.sin(first)
+            centre = (
+                start[0] - side * radius * math.sin(first),
+                start[1] + side * radius * math.cos(first),
+            )
+            arc = Arc(centre, radius, first - side * 0.5 * math.pi, turn, inside)
         available = min(math.dist(before, corner) - used, math.dist(corner, after))
         if tangent > available + _ROUNDING:
             raise InputError.OUT_OF_RANGE(
@@ -220,25 +233,6 @@ def shrunk(corners: Sequence[Point], inside: Point, top: float) -> list[Point]:
                 "smaller kerf, less polishing or a larger cut."
             )
     return points
-
-
-def _fillet(
-    before: Point, corner: Point, after: Point, radius: float, inside: Point
-) -> tuple[float, Arc | None]:
-    """Return the length that a fillet takes of both lines, and its arc; none where it is sharp."""
-    first = math.atan2(corner[1] - before[1], corner[0] - before[0])
-    second = math.atan2(after[1] - corner[1], after[0] - corner[0])
-    turn = math.remainder(second - first, math.tau)
-    if radius <= 0.0 or turn == 0.0:
-        return 0.0, None
-    tangent = radius * math.tan(0.5 * abs(turn))
-    side = math.copysign(1.0, turn)  # of the centre: left of the line for a left turn
-    start = corner[0] - tangent * math.cos(first), corner[1] - tangent * math.sin(first)
-    centre = (
-        start[0] - side * radius * math.sin(first),
-        start[1] + side * radius * math.cos(first),
-    )
-    return tangent, Arc(centre, radius, first - side * 0.5 * math.pi, turn, inside)
 
 
 def outline(cut: NotchCut, chord: float) -> list[Point]:

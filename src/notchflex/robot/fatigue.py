@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from notchflex.robot.kinds import PRINTABLE, celsius
-from notchflex.robot.part import MOST_STRAIN, Float, Problems, part, quantity
+from notchflex.robot.part import MOST_STRAIN, Float, Problems, part, positive, quantity
 
 _Strains = Annotated[
     tuple[Annotated[Float, quantity("", "strain", at_least=0, at_most=MOST_STRAIN)], ...],
@@ -51,11 +51,9 @@ class Fatigue:
     amplitude: Annotated[
         _Strains | None, Field(description="strain amplitude allowed at each of them")
     ] = None
-    cycles: Annotated[Float | None, quantity("", "cycles of the line", above=0, at_most=1e15)] = (
-        None
-    )
+    cycles: Annotated[Float | None, positive("", "cycles of the line", at_most=1e15)] = None
     reliability: Annotated[
-        Float | None, quantity("", "part of the specimens that survive", above=0, at_most=1)
+        Float | None, positive("", "part of the specimens that survive", at_most=1)
     ] = None
     temperature: Annotated[Float | None, celsius("temperature of the tests")] = None
     surface: Annotated[_Words, Field(description="surface of the specimens")] = None
@@ -64,9 +62,9 @@ class Fatigue:
         Float | None,
         quantity("", "strain at the corners of the cut over that of the section", at_least=1.0),
     ] = None
-    corner_radius: Annotated[
-        Float | None, quantity("mm", "radius of the corners of the cut", above=0)
-    ] = None
+    corner_radius: Annotated[Float | None, positive("mm", "radius of the corners of the cut")] = (
+        None
+    )
 
     def conflicts(self) -> Problems:
         """Find a line that is given twice or by half, and means that do not rise."""

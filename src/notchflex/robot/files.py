@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from notchflex._replacing import AnyPath
 from notchflex.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ _PART, _WRITER_COMES = 2**16, 3.0
 """Bytes that are read at once, and how long a pipe waits for its writer, s."""
 
 
-def bounded_bytes(path: str | os.PathLike[str], most: int = _LARGEST) -> bytes:
+def bounded_bytes(path: AnyPath, most: int = _LARGEST) -> bytes:
     """Read a file of at most so many bytes; a pipe without a writer raises `OSError` too."""
     with open(path, "rb", buffering=0, opener=_at_once) as file:
         pipe = stat.S_ISFIFO(os.fstat(file.fileno()).st_mode)
@@ -59,7 +60,7 @@ def _at_once(path: str, flags: int) -> int:
 
 
 def read_text(
-    source: str | os.PathLike[str],
+    source: AnyPath,
     kind: str,
     shown: str | None = None,
     error_class: type[InputError] = InputError,
@@ -151,26 +152,23 @@ class Table:
         import numpy as np  # robots without a file are read without it
 
         hint = "; leave the entry empty where there is none" if may_miss and not is_load else ""
-        return np.array(
-            [
-                math.nan if may_miss and not text else self._number(text, column, line, hint)
-                for text, line in zip(self.texts(column), self.lines, strict=True)
-            ]
-        )
-
-    def _number(self, text: str, column: str, line: int, hint: str) -> float:
-        column = self.written.get(column, column)
-        place = f"{self.name}, line {line}: {column} is"
-        try:
-            value = float(text.replace(self.decimal, ".", 1))
-        except ValueError:
-            got = repr(text) if text else "nothing"
-            raise InputError.NOT_A_NUMBER(f"{place} {got}; give a number{hint}.") from None
-        if not math.isfinite(value):
-            raise InputError.NOT_FINITE(f"{place} {text}; give a finite number{hint}.")
-        if abs(value) > LARGEST:
-            raise InputError.OUT_OF_RANGE(f"{place} {text}; give at most {LARGEST:g}.")
-        return value
+        values, written = list[float](), self.written.get(column, column)
+        for text, line in zip(self.texts(column), self.lines, strict=True):
+            if may_miss and not text:
+                values.append(math.nan)
+                continue
+            place = f"{self.name}, line {line}: {written} is"
+            try:
+                value = float(text.replace(self.decimal, ".", 1))
+            except ValueError:
+                got = repr(text) if text else "nothing"
+                raise InputError.NOT_A_NUMBER(f"{place} {got}; give a number{hint}.") from None
+            if not math.isfinite(value):
+                raise InputError.NOT_FINITE(f"{place} {text}; give a finite number{hint}.")
+            if abs(value) > LARGEST:
+                raise InputError.OUT_OF_RANGE(f"{place} {text}; give at most {LARGEST:g}.")
+            values.append(value)
+        return np.array(values)
 
     def place_of(self, row: int) -> str:
         """Return where a row (from 0) stands, as messages begin: file and line."""
@@ -196,11 +194,14 @@ class Table:
         return f"the columns are {', '.join(self.written.get(one, one) for one in self.header)}"
 
 
-def csv_table(source: str | os.PathLike[str]) -> Table:
+def csv_table(source: AnyPath) -> Table:
     """Read a table of at least one row, as it stands in a file."""
     path, text = Path(source), read_text(source, "CSV file")
-    separator = _separator(text)
-    reader = csv.reader(text.splitlines(), strict=True, delimiter=separator)
+    lines = text.splitlines()
+    filled = (line for line in lines if line.strip(" ;,") and not line.lstrip().startswith("#"))
+    head = next(filled, "")
+    separator = ";" if ";" in head and "," not in head else ","
+    reader = csv.reader(lines, strict=True, delimiter=separator)
     try:
         table = [
             (reader.line_num, tuple(map(str.strip, row)))
@@ -238,13 +239,6 @@ def csv_table(source: str | os.PathLike[str]) -> Table:
     decimal = "." if separator == "," else _decimal(path, lines, rows)
     entries = dict(zip(header, zip(*rows, strict=True), strict=True))
     return Table(str(source), entries, lines, decimal)
-
-
-def _separator(text: str) -> str:
-    """Return what separates the columns: a semicolon where the header has no comma."""
-    lines = (line for line in text.splitlines() if line.strip(" ;,"))
-    header = next((line for line in lines if not line.lstrip().startswith("#")), "")
-    return ";" if ";" in header and "," not in header else ","
 
 
 def _decimal(path: Path, lines: Sequence[int], rows: Sequence[Sequence[str]]) -> str:

@@ -27,6 +27,7 @@ from notchflex.robot.part import (
     Problems,
     kind_of,
     part,
+    positive,
     quantity,
     unchecked,
 )
@@ -51,12 +52,8 @@ class Tube:
         0.81
     """
 
-    outer_diameter: Annotated[
-        Float, quantity("mm", "outer diameter of the tube", above=0, usual=(0.1, 50))
-    ]
-    inner_diameter: Annotated[
-        Float, quantity("mm", "inner diameter of the tube", above=0, usual=(0.05, 50))
-    ]
+    outer_diameter: Annotated[Float, positive("mm", "outer diameter of the tube", usual=(0.1, 50))]
+    inner_diameter: Annotated[Float, positive("mm", "inner diameter of the tube", usual=(0.05, 50))]
     base_length: Annotated[
         Float, quantity("mm", "uncut length before the first notch", at_least=0)
     ] = 0.0
@@ -128,7 +125,7 @@ class Tendon:
 
     radius: Annotated[
         Float,
-        quantity("mm", "distance of the tendon from the tube axis", above=0, usual=(0.02, 25)),
+        positive("mm", "distance of the tendon from the tube axis", usual=(0.02, 25)),
     ]
     direction_deg: Annotated[
         Float, quantity("deg", "side of the tube on which the tendon runs")
@@ -138,7 +135,7 @@ class Tendon:
         Field(ge=1, description="body in which the tendon ends, from 1; left out: the last"),
     ] = None
     axial_stiffness: Annotated[
-        FloatOrInf, quantity("N", "E A of the tendon; inf is inextensible", above=0)
+        FloatOrInf, positive("N", "E A of the tendon; inf is inextensible")
     ] = math.inf
     path: Annotated[
         Literal["wall-arc", "straight", "straight-dead", "straight-follower"],
@@ -153,10 +150,10 @@ class Tendon:
     ] = 0.0
     diameter: Annotated[
         Float | None,
-        quantity("mm", "diameter of the tendon, which must fit the lumen or the wall", above=0),
+        positive("mm", "diameter of the tendon, which must fit the lumen or the wall"),
     ] = None
     disk_radius: Annotated[
-        tuple[Annotated[Float, quantity("mm", "distance from the axis", above=0)], ...] | None,
+        tuple[Annotated[Float, positive("mm", "distance from the axis")], ...] | None,
         Field(
             min_length=1,
             max_length=10_000,
@@ -184,7 +181,7 @@ class Tendon:
 
     sheath_length: Annotated[
         Float | None,
-        quantity("mm", "length of the sheath from the drive to the base; left out: none", above=0),
+        positive("mm", "length of the sheath from the drive to the base; left out: none"),
     ] = None
     sheath_friction: Annotated[
         Float | None,
@@ -196,10 +193,10 @@ class Tendon:
         Float | None, quantity("deg", "total angle by which the sheath is bent", at_least=0)
     ] = None
     sheath_wire_stiffness: Annotated[
-        Float | None, quantity("N", "E A of the wire in the sheath", above=0)
+        Float | None, positive("N", "E A of the wire in the sheath")
     ] = None
     sheath_stiffness: Annotated[
-        Float | None, quantity("N", "E A of the sheath under compression; left out: rigid", above=0)
+        Float | None, positive("N", "E A of the sheath under compression; left out: rigid")
     ] = None
     backlash: Annotated[
         Float | None,
@@ -249,9 +246,7 @@ class Drive:
 
     tendon: Annotated[Int, Field(ge=1, description="tendon that is drawn forward, from 1")]
     antagonist: Annotated[Int, Field(ge=1, description="tendon that is released then, from 1")]
-    pretension: Annotated[
-        Float, quantity("N", "tension of both where the spool stands at 0", above=0)
-    ]
+    pretension: Annotated[Float, positive("N", "tension of both where the spool stands at 0")]
 
 
 # What parts are cited by.
@@ -310,11 +305,11 @@ class Material:
         quantity("", "Poisson's ratio, for shear and torsion", above=-1, at_most=0.5),
     ] = 0.33
     density: Annotated[
-        Float | None, quantity("kg/m3", "density, for the weight", above=0, usual=(200, 25_000))
+        Float | None, positive("kg/m3", "density, for the weight", usual=(200, 25_000))
     ] = None
     allowed_strain: Annotated[
         Float | None,
-        quantity("", "strain beyond which a simulation warns", above=0, at_most=MOST_STRAIN),
+        positive("", "strain beyond which a simulation warns", at_most=MOST_STRAIN),
     ] = None
 
 
@@ -421,7 +416,7 @@ class Notch:
         Float, quantity("deg", "angle of the notch when nothing pulls", above=-180, below=180)
     ] = 0.0
     stiffness_factor: Annotated[
-        Float, quantity("", "factor on its stiffness in all directions", above=0, usual=(0.5, 2))
+        Float, positive("", "factor on its stiffness in all directions", usual=(0.5, 2))
     ] = 1.0
     repeat: Annotated[
         Int,

@@ -430,3 +430,7 @@ def quantity(
         description=text,
         json_schema_extra=extra or None,
     )
+
+
+positive = functools.partial(quantity, above=0)
+"""Describes a number that must be greater than 0."""

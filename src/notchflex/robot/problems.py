@@ -387,12 +387,10 @@ def robot_warnings(robot: "Robot") -> Iterator[InputWarning]:
                 by_unit.setdefault((unit_of(field), other), []).append(unusual)
     for (unit, other), values in by_unit.items():
         yield _outside(values, unit, other)
-    own = (
-        (f"{named.name}.", getattr(named.part, "material", None)) for named in named_parts(robot)
-    )
-    for place, material in [("", robot.material), *own]:
-        used = getattr(material, "used_at", None)
-        yield from too_cold(material, f"{place}material.temperature", used)
+    for named in named_parts(robot):
+        own = f"{named.name}.material", getattr(named.part, "material", None)
+        for name, part in ((named.name, named.part), own):
+            yield from too_cold(part, f"{name}.temperature", getattr(part, "used_at", None))
     if not by_unit:
         yield from _narrow_channels(robot)
         yield from _remaining_depths(robot)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from notchflex._ready import READY, ready_names
+from notchflex._replacing import AnyPath
 from notchflex.errors import InputError, RobotFileError
 from notchflex.robot.files import csv_table, read_text
 from notchflex.robot.part import nearest
@@ -24,7 +25,7 @@ from notchflex.robot.value_names import change_table
 Refused = TypeVar("Refused", bound=InputError)
 
 
-def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
+def load_robot(name_or_path: AnyPath) -> Robot:
     """Read a robot: a ready one by its name, or a robot file.
 
     Args:
@@ -48,9 +49,7 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
     return robot
 
 
-def load_changed(
-    name_or_path: str | os.PathLike[str], values: Sequence[tuple[str, object]]
-) -> Changed:
+def load_changed(name_or_path: AnyPath, values: Sequence[tuple[str, object]]) -> Changed:
     """Read a robot and set values of it, which may repair its file; nothing warns."""
     path = _find(name_or_path)
     shown = path.stem if path.parent == READY else str(path)
@@ -98,7 +97,7 @@ def robot_from_text(text: str, shown: str = "robot file") -> Robot:
     return remember_source(from_table(parse_toml(text, shown)), text)
 
 
-def _find(name_or_path: str | os.PathLike[str]) -> Path:
+def _find(name_or_path: AnyPath) -> Path:
     """Decide between a ready robot and a file."""
     if not isinstance(name_or_path, str | os.PathLike):  # pyright: ignore
         raise RobotFileError.WRONG_TYPE(

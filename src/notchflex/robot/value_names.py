@@ -159,7 +159,7 @@ def change_table(
             table.setdefault("tolerance", {})[path.strip().removeprefix(_TOLERANCE)] = value
         else:
             targets.append((parse_path(path), value))
-    targets.sort(key=lambda item: (not _is_kind(item[0]), item[0].number is not None))
+    targets.sort(key=lambda item: (not item[0].key.endswith("kind"), item[0].number is not None))
     dropped: dict[str, None] = {}
     seen: set[tuple[Any, ...]] = set()
     for target, value in targets:
@@ -168,17 +168,13 @@ def change_table(
         seen.add(target[1:])
         if target.section == "name":
             table["name"] = value
-        elif _is_kind(target):
+        elif target.key.endswith("kind"):
             dropped |= dict.fromkeys(_set_kind(table, target, value))
         else:
             _set_key(table, target, value)
     for path in dropped:
         table.get("tolerance", {}).pop(path, None)
     return tuple(dropped)
-
-
-def _is_kind(target: ValuePath) -> bool:
-    return target.key.endswith("kind")
 
 
 def _owners_at(table: dict[str, Any], target: ValuePath) -> tuple[str, str, list[dict[str, Any]]]:

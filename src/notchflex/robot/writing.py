@@ -1,6 +1,5 @@
 """Writing robot files, with the comments of the file that a robot came from."""
 
-import os
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -11,7 +10,7 @@ from typing import Any, cast
 import tomlkit
 from tomlkit.exceptions import ParseError
 
-from notchflex._replacing import replacing
+from notchflex._replacing import AnyPath, replacing
 from notchflex.errors import InputError, RobotFileError
 from notchflex.robot.files import read_text
 from notchflex.robot.part import fields_of, unit_of
@@ -33,8 +32,8 @@ _Notes = Mapping[str, str]
 
 def save_robot(
     robot: Robot,
-    path: str | os.PathLike[str],
-    template: str | os.PathLike[str] | None = None,
+    path: AnyPath,
+    template: AnyPath | None = None,
     *,
     fitted: Mapping[str, str] | None = None,
 ) -> None:

@@ -221,7 +221,13 @@ def _of_mean(
     # What one reading differs from the mean, but for what its tension explains.
     measured = compared[np.ix_(rows, step.entries)] - (drives - drives.mean(axis=0)) @ by_drive.T
     noise = np.diag(step.noise) + by_drive * (step.driving * count) @ by_drive.T
-    part = _change(measured - step.measured, noise + np.diag(step.resolution))
+    # The part of the distances from the mean that noise does not explain, as James and Stein
+    # estimate means (Efron and Morris 1973, *Stein's Estimation Rule and Its Competitors*): 0 where
+    # they are those of noise alone, towards 1 where they are larger.
+    apart, freedom = measured - step.measured, (count - 1) * measured.shape[1]
+    whitening = whitening_of(noise + np.diag(step.resolution))
+    total = float(((apart @ whitening.T) ** 2).sum())
+    part = 1.0 - freedom / total if total > freedom else 0.0
     extra = noise * (1.0 - 1.0 / count)
     white = whitening_of(history.covariance[number] + extra)
     information = white @ history.by_force[number]
@@ -233,14 +239,3 @@ def _of_mean(
         OwnReading(int(row), replace(step, measured=values), *rest)
         for row, values in zip(rows, measured, strict=True)
     ]
-
-
-def _change(apart: Float[np.ndarray, "n m"], noise: Covariance) -> float:
-    """Return the part of distances from a mean that noise does not explain.
-
-    As James and Stein estimate means (Efron and Morris 1973, *Stein's Estimation Rule and Its
-    Competitors*): 0 where the distances are those of noise alone, towards 1 where they are larger.
-    """
-    freedom = (len(apart) - 1) * apart.shape[1]
-    total = float(((apart @ whitening_of(noise).T) ** 2).sum())
-    return 1.0 - freedom / total if total > freedom else 0.0

@@ -93,7 +93,18 @@ def unknown_force(
     directions = np.eye(3)[[AXES.index(axis) for axis in letters]]
     loads = ExternalLoad() if known is None else known.external
     turn = getattr(known, "base_rotation", _NO_TURN)
-    return UnknownForce(tuple(letters), directions, loads, turn, _body(robot, place))
+    body = None
+    if place not in ("tip", "search"):
+        if isinstance(place, str):
+            raise InputError.UNKNOWN_NAME(
+                f'place is "tip", "search" or the number of a body; got {short_repr(place)}'
+            )
+        body = check_integer(place, "place")
+        if not 1 <= body <= robot.number_of_notches:
+            raise InputError.OUT_OF_RANGE(
+                f"place must be a body from 1 to {robot.number_of_notches}; got {body}"
+            )
+    return UnknownForce(tuple(letters), directions, loads, turn, body)
 
 
 def _default_axes(robot: Robot) -> str:
@@ -105,21 +116,6 @@ def _default_axes(robot: Robot) -> str:
         axis for axis, part in zip("yx", normal, strict=False) if abs(part) > 1e-9
     ]
     return "".join(sorted(across))
-
-
-def _body(robot: Robot, place: int | str) -> int | None:
-    if place in ("tip", "search"):
-        return None
-    if isinstance(place, str):
-        raise InputError.UNKNOWN_NAME(
-            f'place is "tip", "search" or the number of a body; got {short_repr(place)}'
-        )
-    body = check_integer(place, "place")
-    if not 1 <= body <= robot.number_of_notches:
-        raise InputError.OUT_OF_RANGE(
-            f"place must be a body from 1 to {robot.number_of_notches}; got {body}"
-        )
-    return body
 
 
 # What readings can't resolve in the model, mm and rad: a stuck tendon of the model is not quite

@@ -232,17 +232,7 @@ def merged(readings: Readings) -> tuple[Readings, Int[np.ndarray, " s"]]:
     deviations = np.repeat(
         [noise.tension, noise.stroke, noise.tip, noise.angle], [table.shape[1] for table in tables]
     )
-    group = _groups(np.concatenate(tables, axis=1), deviations)
-    count = np.bincount(group)
-    rows = np.split(np.arange(len(group)), np.cumsum(count)[:-1])
-    tension, stroke, tip, angles = (
-        np.array([table[some].mean(axis=0) for some in rows]) for table in tables
-    )
-    return Readings(tension, stroke, tip, angles, noise, count.astype(float)), group
-
-
-def _groups(values: Table, deviations: Float[np.ndarray, " m"]) -> Int[np.ndarray, " s"]:
-    """Return which group every reading belongs to."""
+    values = np.concatenate(tables, axis=1)
     group = np.zeros(len(values), int)
     total, size = values[0].copy(), 1
     for number, row in enumerate(values[1:], 1):
@@ -254,4 +244,9 @@ def _groups(values: Table, deviations: Float[np.ndarray, " m"]) -> Int[np.ndarra
         else:
             total, size = row.copy(), 1
             group[number] = group[number - 1] + 1
-    return group
+    count = np.bincount(group)
+    rows = np.split(np.arange(len(group)), np.cumsum(count)[:-1])
+    tension, stroke, tip, angles = (
+        np.array([table[some].mean(axis=0) for some in rows]) for table in tables
+    )
+    return Readings(tension, stroke, tip, angles, noise, count.astype(float)), group

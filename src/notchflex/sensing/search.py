@@ -160,7 +160,12 @@ def extreme(
         The end of the connected part around the force.
     """
     largest, origin = problem.model.largest, float(point.variables[component])
-    move = max(_predicted(problem, point, component, most), _FIRST_MOVE * largest)
+    # How far the component can move in the linearised problem, where slopes tell it.
+    slopes = point.slopes
+    normal = slopes.T @ slopes + problem.least_squares.weak**2 * np.eye(slopes.shape[1])
+    lean = float(np.linalg.inv(normal)[component, component])
+    move = math.sqrt(max(most - point.merit, 0.0) * lean)
+    move = max(move if move < largest else 0.0, _FIRST_MOVE * largest)
     beyond = None
     while not side * (here := float(point.variables[component])) >= largest * (1.0 - 1e-9):
         if beyond is None:
@@ -216,12 +221,3 @@ def _farthest(
     elif count:  # one component needs no slopes
         point = replace(point, variables=forces[count - 1])
     return point, beyond
-
-
-def _predicted(problem: ReadingProblem, point: SearchPoint, component: int, most: float) -> float:
-    """How far a component can move in the linearised problem; 0 where slopes tell nothing."""
-    slopes = point.slopes
-    normal = slopes.T @ slopes + problem.least_squares.weak**2 * np.eye(slopes.shape[1])
-    lean = float(np.linalg.inv(normal)[component, component])
-    move = math.sqrt(max(most - point.merit, 0.0) * lean)
-    return move if move < problem.model.largest else 0.0

@@ -14,7 +14,7 @@ from notchflex.search.least_squares import SearchPoint
 from notchflex.sensing.bounds import Bounds, bounds
 from notchflex.sensing.history import estimate, own_readings, state_after, with_noise
 from notchflex.sensing.model import SensingModel, unknown_force
-from notchflex.sensing.readings import Readings, SensorNoise, merged, readings_of
+from notchflex.sensing.readings import SensorNoise, merged, readings_of
 from notchflex.sensing.sensed import LeftOpen, SensedForce
 from notchflex.support import ExternalLoad, check_is_robot, check_number
 
@@ -86,10 +86,29 @@ def sense(
     given = readings_of(robot, tensions, strokes, tip, angles, sensors)
     readings, group = merged(given)
     unknown = unknown_force(robot, components, place, known)
-    model = SensingModel(robot, readings, unknown, _largest(robot, readings, largest))
+    if largest is None:
+        lever = max(tendon.radius for tendon in robot.tendon)
+        tension = float(np.nanmax(readings.tension, initial=0.0))
+        far = _RANGE * max(tension, 1.0) * lever / robot.geometry.length
+    elif not 0.0 < (far := check_number(largest, "largest", "a force in N")) < np.inf:
+        raise InputError.OUT_OF_RANGE(
+            f"largest is the largest force looked for, above 0 N; got {far:g}"
+        )
+    model = SensingModel(robot, readings, unknown, far)
     places: dict[int | None, float] = {}
     if place == "search":
-        model, places = _best_place(model, progress)
+        bodies = [*range(1, robot.number_of_notches + 1), None]
+        report = _stage(progress, "trying places")
+        for number, body in enumerate(bodies, 1):
+            candidates = estimate(replace(model, unknown=replace(unknown, body=body))).best
+            whole = len(candidates) == len(readings)
+            places[body] = sum(point.merit for point in candidates) if whole else np.inf
+            if report is not None:
+                report(number, len(bodies))
+        # Of places that fit as well the tip is taken: it is where robots touch.
+        least = min(places.values())
+        body = None if places[None] <= least + 1e-6 else min(places, key=lambda one: places[one])
+        model = replace(model, unknown=replace(unknown, body=body))
     history = with_noise(estimate(model, _stage(progress, "finding the force")))
     own = own_readings(history, given, group)
     ends = bounds(history, own, LEVEL, _stage(progress, "finding the interval"))
@@ -98,41 +117,8 @@ def sense(
     return _result(model, history.best, ends, left_open, places, group)
 
 
-def _largest(robot: Robot, readings: Readings, largest: float | None) -> float:
-    """Return the range of the search, N."""
-    if largest is not None:
-        value = check_number(largest, "largest", "a force in N")
-        if not 0.0 < value < np.inf:
-            raise InputError.OUT_OF_RANGE(
-                f"largest is the largest force looked for, above 0 N; got {value:g}"
-            )
-        return value
-    lever = max(tendon.radius for tendon in robot.tendon)
-    tension = float(np.nanmax(readings.tension, initial=0.0))
-    return _RANGE * max(tension, 1.0) * lever / robot.geometry.length
-
-
 def _stage(progress: Stage | None, name: str) -> Callable[[int, int], None] | None:
     return None if progress is None else lambda done, count: progress(name, done, count)
-
-
-def _best_place(
-    model: SensingModel, progress: Stage | None
-) -> tuple[SensingModel, dict[int | None, float]]:
-    """Return the model with the force where it fits best, and the misfit of every place."""
-    bodies = [*range(1, model.robot.number_of_notches + 1), None]
-    report = _stage(progress, "trying places")
-    misfits: dict[int | None, float] = {}
-    for number, body in enumerate(bodies, 1):
-        candidates = estimate(replace(model, unknown=replace(model.unknown, body=body))).best
-        whole = len(candidates) == len(model.readings)
-        misfits[body] = sum(point.merit for point in candidates) if whole else np.inf
-        if report is not None:
-            report(number, len(bodies))
-    # Of places that fit as well the tip is taken: it is where robots touch.
-    least = min(misfits.values())
-    body = None if misfits[None] <= least + 1e-6 else min(misfits, key=lambda one: misfits[one])
-    return replace(model, unknown=replace(model.unknown, body=body)), misfits
 
 
 def _result(

@@ -50,7 +50,15 @@ class LeftOpen:
         """
         number, factor = reading.number, float(np.sqrt(chi2.ppf(level, 1)))
         half = 0.5 * (ends.high[number] - ends.low[number])
-        directions, spreads = _spreads(reading.information)
+        # Directions as unit rows, the largest entry of each positive, and the standard deviation of
+        # the force by noise along each: infinite where nothing that is read depends on it.
+        slopes = reading.information
+        _, values, rows = np.linalg.svd(slopes.reshape(-1, slopes.shape[1]))
+        values = np.concatenate([values, np.zeros(len(rows) - len(values))])
+        spreads = np.full(len(rows), np.inf)
+        np.divide(1.0, values, out=spreads, where=values > 0.0)
+        signs = np.sign(rows[np.arange(len(rows)), np.abs(rows).argmax(axis=1)])
+        directions = rows * signs[:, None]
         far = spreads > LINEAR * model.largest
         keeps = np.eye(model.size) - directions[far].T @ directions[far]
         of_mean, more = keeps @ reading.gain, keeps @ reading.more
@@ -74,22 +82,6 @@ class LeftOpen:
         # Where noise explains the distance from the mean, the estimate is the mean.
         covariance = noise + reading.part * beyond + open_
         return cls(covariance, stuck | (wide & ~ends.limited[number]), rows)
-
-
-def _spreads(
-    slopes: Float[np.ndarray, "m d"],
-) -> tuple[Float[np.ndarray, "d d"], Float[np.ndarray, " d"]]:
-    """Return directions as unit rows, and the standard deviation of the force by noise along each.
-
-    It is infinite where nothing that is read depends on the force.
-    """
-    _, values, rows = np.linalg.svd(slopes.reshape(-1, slopes.shape[1]))
-    values = np.concatenate([values, np.zeros(len(rows) - len(values))])
-    spreads = np.full(len(rows), np.inf)
-    np.divide(1.0, values, out=spreads, where=values > 0.0)
-    # One sign of each: the largest entry is positive.
-    signs = np.sign(rows[np.arange(len(rows)), np.abs(rows).argmax(axis=1)])
-    return rows * signs[:, None], spreads
 
 
 def direction_in_words(names: Sequence[str], direction: Float[np.ndarray, " d"]) -> str:

@@ -61,18 +61,14 @@ def read_sensor_table(
     ):
         used |= {*names}
         if what in beside:
-            read[what] = _wanted(table, dict(enumerate(names)), len(names)) / scale
+            present = {place: name for place, name in enumerate(names) if name in table.header}
+            if not present:
+                raise InputError.TABLE_COLUMNS(
+                    f"{table.name}: there is no column {names[0]}; {table.columns}."
+                )
+            read[what] = _columns(table, present, len(names)) / scale
     table.unused(used)
     return read
-
-
-def _wanted(table: Table, names: dict[int, str], width: int) -> np.ndarray:
-    present = {place: name for place, name in names.items() if name in table.header}
-    if not present:
-        raise InputError.TABLE_COLUMNS(
-            f"{table.name}: there is no column {next(iter(names.values()))}; {table.columns}."
-        )
-    return _columns(table, present, width)
 
 
 def _columns(table: Table, columns: dict[int, str], width: int) -> np.ndarray:

@@ -81,7 +81,18 @@ def held_stiffness(
         sign[finite] = np.linalg.slogdet(good)[0]
         if by_stroke is not None:
             missing = np.asarray(solved.stroke)[some] - np.asarray(commands.target)[some]
-            determinate = _independent(chain, strokes, by_stroke, missing)
+            # Whether the strokes of the inextensible tendons that are held are independent.
+            nearly = _NEARLY_HELD * float(np.asarray(chain.rods.length).sum(axis=-1).min())
+            held = by_stroke & np.asarray(chain.inextensible) & (missing < nearly)
+            scaled = strokes / np.sqrt(np.asarray(chain.stiffness).ravel())
+            scaled = scaled / np.maximum(np.linalg.norm(scaled, axis=-1, keepdims=True), 1e-300)
+            determinate = np.array(
+                [
+                    np.linalg.matrix_rank(rows[which], tol=_DEPENDENT) == which.sum()
+                    for rows, which in zip(scaled, held, strict=True)
+                ],
+                bool,
+            )
             tension = np.asarray(solved.point[1])[some]
             stressed = tension > _UNSTRESSED * float(chain.closing_force)
             sign = np.where(determinate | ~stressed.any(axis=-1), sign, 0.0)
@@ -148,26 +159,6 @@ def _assemble(
         soft = by_stroke / (_HOLDING_STIFFNESS * np.asarray(chain.stroke_stiffness))
         matrix[:, tensions, tensions] += soft
     return matrix, lengths[0][..., modes.ravel()]
-
-
-def _independent(
-    chain: Chain,
-    strokes: Float[np.ndarray, "s t modes"],
-    by_stroke: Bool[np.ndarray, "s t"],
-    missing: Float[np.ndarray, "s t"],
-) -> Bool[np.ndarray, " s"]:
-    """Return whether the strokes of the inextensible tendons that are held are independent."""
-    nearly = _NEARLY_HELD * float(np.asarray(chain.rods.length).sum(axis=-1).min())
-    held = by_stroke & np.asarray(chain.inextensible) & (missing < nearly)
-    scaled = strokes / np.sqrt(np.asarray(chain.stiffness).ravel())
-    scaled = scaled / np.maximum(np.linalg.norm(scaled, axis=-1, keepdims=True), 1e-300)
-    return np.array(
-        [
-            np.linalg.matrix_rank(rows[some], tol=_DEPENDENT) == some.sum()
-            for rows, some in zip(scaled, held, strict=True)
-        ],
-        bool,
-    )
 
 
 def stable(

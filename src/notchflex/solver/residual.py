@@ -27,7 +27,7 @@ from notchflex.mechanics.sheath import (
     mean_tension,
     within,
 )
-from notchflex.mechanics.tendon import Crossing, TendonGroup, fibre_lengths
+from notchflex.mechanics.tendon import Crossing, OfTendons, TendonGroup, fibre_lengths
 
 # Poses of bodies: against the base, and against those before.
 
@@ -176,7 +176,7 @@ class Iterate(NamedTuple):
     """
 
     unknowns: Unknowns
-    base_tension: Float[Array, " t"]
+    base_tension: OfTendons
 
 
 class Memory(NamedTuple):
@@ -260,17 +260,17 @@ class SolverState(NamedTuple):
 
     point: Iterate
     memory: Memory
-    stroke: Float[Array, " t"]
+    stroke: OfTendons
     applied: BodyLoads | None
 
     @property
-    def tension(self) -> Float[Array, " t"]:
+    def tension(self) -> OfTendons:
         """Tension of every drive, N."""
         sheath = self.memory.sheath
         return self.point.base_tension if sheath is None else sheath.tension
 
     @property
-    def wire_stroke(self) -> Float[Array, " t"]:
+    def wire_stroke(self) -> OfTendons:
         """Way of the end of every wire, mm: within a backlash it stands, and the drive moves."""
         sheath = self.memory.sheath
         return self.stroke if sheath is None else self.stroke - sheath.play
@@ -335,9 +335,9 @@ class BaseReaction(NamedTuple):
         tension_length: Sum of tension times length of every tendon, N mm.
     """
 
-    base_tension: Float[Array, " t"]
-    released_length: Float[Array, " t"]
-    tension_length: Float[Array, " t"]
+    base_tension: OfTendons
+    released_length: OfTendons
+    tension_length: OfTendons
 
 
 class Evaluation(NamedTuple):
@@ -551,7 +551,7 @@ def span_mask(chain: Chain, back: Array) -> Float[Array, "n t window"]:
 # Actuation of the tendons at the base: by a tension, or by a stroke.
 
 
-def stroke(chain: Chain, base: BaseReaction) -> Float[Array, " t"]:
+def stroke(chain: Chain, base: BaseReaction) -> OfTendons:
     """Compute the stroke from the free robot (mm), with the tendon stiffness of the file."""
     tension_length = base.tension_length + base.base_tension * chain.free_length
     return base.released_length + tension_length / chain.axial_stiffness
@@ -578,7 +578,7 @@ def closing_stroke(chain: Chain) -> Float[np.ndarray, " t"]:
 
 def command_residual(
     chain: Chain, command: Command, memory: SheathMemory | None, base: BaseReaction
-) -> Float[Array, " t"]:
+) -> OfTendons:
     """Compute the deviation of the tendons from their command, scaled like angles."""
     # A tendon driven by stroke is slack where the robot has released more than is drawn: tension >=
     # 0, stroke released >= stroke commanded, product 0.
@@ -615,9 +615,7 @@ def command_residual(
     return jnp.where(slip >= toward_drive, toward_drive, held)
 
 
-def without_slack(
-    chain: Chain, command: Command, point: Iterate, reached: Float[Array, " t"]
-) -> Iterate:
+def without_slack(chain: Chain, command: Command, point: Iterate, reached: OfTendons) -> Iterate:
     """Set the tensions of slack tendons at a solved point to zero, given the strokes reached."""
     if command.by_stroke is None:
         return point

@@ -89,7 +89,6 @@ def _stop_gradient(tree: Any) -> Any:
 @jax.custom_jvp
 def _zero_with_tangent(known: Array, varied: Array) -> Array:
     """Return zeros with the tangent of a value, NaN where that is not known."""
-    del known
     return jnp.zeros_like(varied)
 
 

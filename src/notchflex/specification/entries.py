@@ -39,23 +39,22 @@ def chosen_entries(
         InputError: There is no such entry.
     """
     check_axes(asked, per)
-    along = [_places(asked, axis, size) for axis, size in zip(per, sizes, strict=True)]
+    along: list[Sequence[int]] = []
+    for axis, size in zip(per, sizes, strict=True):
+        numbers, first = getattr(asked, axis, None), _first(axis)
+        if numbers is None:
+            along.append(range(size))
+        elif axis == "axis":
+            along.append([AXES.index(numbers)])
+        else:
+            for number in numbers:
+                if not first <= number < first + size:
+                    raise InputError.OUT_OF_RANGE(
+                        f"there is no {axis} {number}; give a number from {first} to "
+                        f"{first + size - 1}."
+                    )
+            along.append([number - first for number in dict.fromkeys(numbers)])
     return list(itertools.product(*along))
-
-
-def _places(asked: Measured, axis: str, size: int) -> Sequence[int]:
-    numbers = getattr(asked, axis, None)
-    if numbers is None:
-        return range(size)
-    if axis == "axis":
-        return [AXES.index(numbers)]
-    first = _first(axis)
-    for number in numbers:
-        if not first <= number < first + size:
-            raise InputError.OUT_OF_RANGE(
-                f"there is no {axis} {number}; give a number from {first} to {first + size - 1}."
-            )
-    return [number - first for number in dict.fromkeys(numbers)]
 
 
 def entry_names(per: Sequence[str], entry: Sequence[int]) -> list[str]:

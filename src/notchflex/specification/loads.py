@@ -78,10 +78,8 @@ def _with_external(path: LoadPath, table: Mapping[str, Any]) -> LoadPath:
     """Put external loads on all steps."""
     following = table.get("following", False)
     forces = [
-        BodyForce(body, force, point=point or (0.0, 0.0, 0.0), following=following)
-        for body, force, point in map(
-            read_body_force, map(str, as_list(table.get("body_force", ())))
-        )
+        BodyForce(**read_body_force(str(force))._asdict(), following=following)
+        for force in as_list(table.get("body_force", ()))
     ]
     return path.loaded(
         **{key: _vector(key, table[key]) for key in _VECTORS if key in table},

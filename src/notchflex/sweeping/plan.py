@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import KW_ONLY
 from typing import Annotated, Any, Literal
 
@@ -19,6 +18,7 @@ from notchflex.specification import (
     with_robot,
 )
 from notchflex.support import (
+    AnyPath,
     Float,
     Int,
     ProblemError,
@@ -190,7 +190,7 @@ class SweepPlan:
         return self
 
 
-def read_plan(path: str | os.PathLike[str]) -> tuple[SweepPlan, Robot]:
+def read_plan(path: AnyPath) -> tuple[SweepPlan, Robot]:
     """Read a plan file and the robot that it names.
 
     Args:

@@ -5,7 +5,6 @@ What a row gives depends on the plan alone: not on the process, on the rows befo
 
 from __future__ import annotations
 
-import os
 import shutil
 import time
 from collections.abc import Mapping, Sequence
@@ -50,6 +49,7 @@ from notchflex.specification import (
     with_robot,
 )
 from notchflex.support import (
+    AnyPath,
     Displayed,
     Summary,
     from_table,
@@ -272,7 +272,7 @@ class Sweep(Displayed):
         return Summary(title, rows, ".lazy() is a frame of polars, .to_xarray() a data set")
 
 
-def read_sweep(directory: str | os.PathLike[str]) -> Sweep:
+def read_sweep(directory: AnyPath) -> Sweep:
     """Read a sweep, which may be unfinished.
 
     Args:
@@ -317,14 +317,6 @@ _SAMPLE = 1024
 """Rows from all over a sweep, from which the scales of its statistics come."""
 
 
-def axis_values(variable: SweepVariable) -> Float[np.ndarray, " k"]:
-    """Return the values of a variable of the grid."""
-    if variable.values is not None:
-        return np.array(variable.values)
-    spaced = np.geomspace if variable.spacing == "log" else np.linspace
-    return spaced(variable.lower, variable.upper, variable.count)  # pyright: ignore
-
-
 def _ends(variable: SweepVariable) -> tuple[float, float]:
     """Return the least and the greatest value of a variable."""
     values = variable.values or (variable.lower, variable.upper)
@@ -364,7 +356,9 @@ def _numbers(
     """Return numbers by name at places of the grid and sampled levels."""
     numbers: dict[str, np.ndarray] = {}
     for variable in plan.grid[::-1]:
-        values = axis_values(variable)
+        spaced = np.geomspace if variable.spacing == "log" else np.linspace
+        values: Any = variable.values or spaced(variable.lower, variable.upper, variable.count)  # pyright: ignore
+        values = np.array(values)
         places, place = np.divmod(places, len(values))
         numbers[variable.value] = values[place]
     for variable, level in zip(plan.sampled, levels.T, strict=False):
@@ -411,15 +405,6 @@ def _middle(plan: SweepPlan, robot: Robot) -> Robot:
         raise type(problem)(message if invalid else str(problem), problem.code) from None
 
 
-def _column_name(criterion: Criterion, has_load: bool) -> str:
-    """Return the name of a column, such as `notch_angle_3_deg_at_pulled_step_2`."""
-    words = [criterion.quantity.name, *entry_names(criterion.quantity.per, criterion.index)]
-    words.append(criterion.quantity.unit.replace(" ", ""))
-    words.append(f"at_{criterion.load}" if has_load else "")
-    words.append(f"step_{criterion.step + 1}" if "step " in criterion.name else "")
-    return "_".join(filter(None, words))
-
-
 @dataclass(frozen=True, eq=False)
 class SweepTask(PieceTask):
     """The robots of a sweep, in pieces.
@@ -457,9 +442,15 @@ class SweepTask(PieceTask):
 
     @cached_property
     def columns(self) -> list[str]:
-        """Names of the columns of the kept numbers."""
-        has_load = len(self.study.paths) > 1
-        return [_column_name(criterion, has_load) for criterion in self.study.criteria]
+        """Names of the columns of the kept numbers: `notch_angle_3_deg_at_pulled_step_2`."""
+        columns, has_load = list[str](), len(self.study.paths) > 1
+        for one in self.study.criteria:
+            words = [one.quantity.name, *entry_names(one.quantity.per, one.index)]
+            words.append(one.quantity.unit.replace(" ", ""))
+            words.append(f"at_{one.load}" if has_load else "")
+            words.append(f"step_{one.step + 1}" if "step " in one.name else "")
+            columns.append("_".join(filter(None, words)))
+        return columns
 
     @cached_property
     def manifest(self) -> Manifest:
@@ -514,8 +505,8 @@ class SweepTask(PieceTask):
 
 
 def sweep(
-    plan: SweepPlan | Mapping[str, Any] | str | os.PathLike[str],
-    directory: str | os.PathLike[str],
+    plan: SweepPlan | Mapping[str, Any] | AnyPath,
+    directory: AnyPath,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -606,7 +597,7 @@ class Estimate(NamedTuple):
     unsolved: int
 
 
-def estimate(plan: SweepPlan | str | os.PathLike[str], *, workers: int | None = None) -> Estimate:
+def estimate(plan: SweepPlan | AnyPath, *, workers: int | None = None) -> Estimate:
     """Solve the first piece of a sweep, and estimate its whole time and size; nothing is written.
 
     Args:

@@ -16,6 +16,7 @@ from notchflex import EquilibriumPath, InputError, Robot, Settings
 from notchflex.pieces import CODES, FAILED, INVALID, PieceFolder, sobol_points
 from notchflex.specification import whole
 from notchflex.support import (
+    AnyPath,
     Displayed,
     Summary,
     Tolerance,
@@ -363,7 +364,7 @@ Stage = Callable[[str, int, int], None]
 
 def tolerance_analysis(
     robot: Robot,
-    spec: ToleranceSpec | str | os.PathLike[str],
+    spec: ToleranceSpec | AnyPath,
     *,
     draws: int = 100_000,
     seed: int = 0,
@@ -371,7 +372,7 @@ def tolerance_analysis(
     refinement: int = 0,
     cores: int | None = None,
     progress: Stage | None = None,
-    folder: PieceFolder | str | os.PathLike[str] | None = None,
+    folder: PieceFolder | AnyPath | None = None,
 ) -> ToleranceAnalysis:
     """Find out what tolerances do to a robot that must meet acceptance limits.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from typing import Annotated, Any
 
@@ -24,7 +23,7 @@ from notchflex.specification import (
     read_load,
     record,
 )
-from notchflex.support import QUANTITIES, Float, read_specification
+from notchflex.support import QUANTITIES, AnyPath, Float, read_specification
 
 
 @record(kw_only=False, refuse=coded)
@@ -118,7 +117,7 @@ class ToleranceFile(OldWords):
     wanted_yield: _Yield = None
 
 
-def read_tolerance_spec(file: str | os.PathLike[str], robot: Robot) -> ToleranceSpec:
+def read_tolerance_spec(file: AnyPath, robot: Robot) -> ToleranceSpec:
     """Read a file of tolerances and acceptance limits.
 
     Args:

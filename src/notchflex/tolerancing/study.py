@@ -6,7 +6,6 @@ They are drawn as independent replicates of scrambled Sobol points; a piece is a
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -44,6 +43,7 @@ from notchflex.pieces import (
     summed_up,
 )
 from notchflex.support import (
+    AnyPath,
     Tolerance,
     ToleranceSource,
     sources_of,
@@ -392,7 +392,7 @@ class DrawnPieces(DrawnCounts):
         sketches: Statistics of each number.
     """
 
-    directory: str | os.PathLike[str]
+    directory: AnyPath
     sketches: Sequence[Sketch]
 
     def percentile(self, part: float) -> Float[np.ndarray, " k"]:

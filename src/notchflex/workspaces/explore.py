@@ -8,7 +8,6 @@ pulled at a time: what more would add is pressed together, not moved.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -47,6 +46,7 @@ from notchflex.specification import (
     whole,
 )
 from notchflex.support import (
+    AnyPath,
     ExternalLoad,
     check_is_robot,
     check_number,
@@ -171,14 +171,28 @@ def rays(
         pretension: Tension that every tendon has at least, N.
         points: Returns points of the sequence, of so many numbers each between 0 and 1.
     """
-    groups = _groups(robot, largest)
+    # The tendons that are pulled, by the body where they end, in order around the tube.
+    by_end: dict[int, list[int]] = {}
+    for number in np.flatnonzero(largest > 0.0).tolist():
+        end = robot.tendon[number].end_body or robot.number_of_notches
+        by_end.setdefault(end, []).append(number)
+    turn = [tendon.direction_deg % 360.0 for tendon in robot.tendon]
+    groups = [sorted(group, key=turn.__getitem__) for group in by_end.values()]
     drawn = points(2 * len(groups) + 2)
     # Rays side by side take as many iterations as the hardest of them: similar ones together.
     drawn = drawn[np.argsort(drawn[:, 0], kind="stable")]
     directions = np.zeros((len(drawn), robot.number_of_tendons))
     for number, group in enumerate(groups):
-        around, share = drawn[:, 2 * number], drawn[:, 2 * number + 1]
-        part = _around(group, around, robot.number_of_tendons)
+        # Neighbours at places from 0 to 1 around the tube are pulled, the more tense of two by 1.
+        place, share = drawn[:, 2 * number], drawn[:, 2 * number + 1]
+        part, row, order = np.zeros_like(directions), np.arange(len(drawn)), np.array(group)
+        pairs = 1 if len(group) == 2 else len(group)
+        pair = np.minimum((place * pairs).astype(int), pairs - 1)
+        angle = 0.5 * np.pi * (place * pairs - pair)
+        part[row, order[pair]] = np.cos(angle)
+        if len(group) > 1:
+            part[row, order[(pair + 1) % len(group)]] = np.sin(angle)
+        part /= part.max(axis=1, keepdims=True)
         directions += part * share[:, None] if len(groups) > 1 else part
     directions /= directions.max(axis=1, keepdims=True)
     peak = np.where(np.arange(len(drawn)) % 2 == 0, 1.0, np.sqrt(drawn[:, -2]))
@@ -187,32 +201,6 @@ def rays(
     up = peak[:, None] * steps
     ways = np.concatenate([up, up[:, ::-1]], axis=1)
     return np.maximum(ways[:, :, None] * directions[:, None] * largest, pretension)
-
-
-def _groups(robot: Robot, largest: Float[np.ndarray, " t"]) -> list[list[int]]:
-    """Return the tendons that are pulled, by the body where they end, in order around the tube."""
-    groups: dict[int, list[int]] = {}
-    for number, tendon in enumerate(robot.tendon):
-        end = robot.number_of_notches if tendon.end_body is None else tendon.end_body
-        if largest[number] > 0.0:
-            groups.setdefault(end, []).append(number)
-    turn = [tendon.direction_deg % 360.0 for tendon in robot.tendon]
-    return [sorted(group, key=turn.__getitem__) for group in groups.values()]
-
-
-def _around(
-    group: Sequence[int], place: Float[np.ndarray, " r"], tendons: int
-) -> Float[np.ndarray, "r t"]:
-    """Return tensions, the larger of two 1, of neighbours at places from 0 to 1 around the tube."""
-    pulled, row = np.zeros((len(place), tendons)), np.arange(len(place))
-    pairs = 1 if len(group) == 2 else len(group)
-    pair = np.minimum((place * pairs).astype(int), pairs - 1)
-    angle = 0.5 * np.pi * (place * pairs - pair)
-    order = np.array(group)
-    pulled[row, order[pair]] = np.cos(angle)
-    if len(group) > 1:
-        pulled[row, order[(pair + 1) % len(group)]] = np.sin(angle)
-    return pulled / pulled.max(axis=1, keepdims=True)
 
 
 def _under(load: ExternalLoad, tension: Float[np.ndarray, "s t"]) -> LoadPath:
@@ -286,8 +274,18 @@ class WorkspaceTask(PieceTask):
             return sobol_points(dimension, self.seed, start, stop, total or self.number)
 
         tension = rays(self.robot, self.largest, _LEVELS, self.pretension, points)
-        if self.limits:
-            tension = tension * self._allowed(tension)[:, None, None]
+        if self.limits:  # the part of each ray that they allow, by a pull in few levels
+            part = np.linspace(0.0, 1.0, _FIRST_LEVELS + 1)
+            peak = tension[:, tension.shape[1] // 2]
+            within = self._solved(part[1:, None] * peak[:, None])[1]
+            last = np.logical_and.accumulate(within, axis=1).sum(axis=1)
+            low, high = part[last], part[np.minimum(last + 1, _FIRST_LEVELS)]
+            for _ in range(_HALVINGS):  # rays as a batch
+                middle = 0.5 * (low + high)
+                steps = np.stack([low, middle], axis=1)[:, :, None] * peak[:, None]
+                fits = self._solved(steps)[1][:, 1]
+                low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+            tension = tension * low[:, None, None]
         names = ["tip_position", "tip_rotation", "peak_strain", "total_angle"]
         outputs, within = self._solved(tension, names)
         # What follows a state beyond a limit has a history that the limit forbids.
@@ -306,20 +304,6 @@ class WorkspaceTask(PieceTask):
         }
         counts = [keeps.sum(), (converged & ~keeps).sum(), (~converged).sum()]
         return {name: values[keeps] for name, values in columns.items()}, np.array(counts)
-
-    def _allowed(self, tension: Float[np.ndarray, "r s t"]) -> Float[np.ndarray, " r"]:
-        """Return the part of each ray that the limits allow, by a pull in few levels."""
-        part = np.linspace(0.0, 1.0, _FIRST_LEVELS + 1)
-        peak = tension[:, tension.shape[1] // 2]
-        within = self._solved(part[1:, None] * peak[:, None])[1]
-        last = np.logical_and.accumulate(within, axis=1).sum(axis=1)
-        low, high = part[last], part[np.minimum(last + 1, _FIRST_LEVELS)]
-        for _ in range(_HALVINGS):  # rays as a batch
-            middle = 0.5 * (low + high)
-            steps = np.stack([low, middle], axis=1)[:, :, None] * peak[:, None]
-            fits = self._solved(steps)[1][:, 1]
-            low, high = np.where(fits, middle, low), np.where(fits, high, middle)
-        return low
 
     def _solved(
         self, tension: Float[np.ndarray, "r s t"], names: Iterable[str] = ()
@@ -454,7 +438,7 @@ def workspace(
     seed: int = 0,
     cores: int | None = None,
     progress: Progress | None = None,
-    folder: PieceFolder | str | os.PathLike[str] | None = None,
+    folder: PieceFolder | AnyPath | None = None,
 ) -> Workspace:
     """Explore where the tip of a robot can go, during loading and unloading.
 

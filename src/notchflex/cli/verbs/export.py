@@ -76,14 +76,19 @@ class PatternArguments:
     paper: Literal["a4", "a3"] = PatternOptions.paper
 
 
-def _file(name: str) -> tuple[str, Any, None]:
-    words, suffixes = FORMATS[name].text, " or ".join(FORMATS[name].suffixes)
-    return name, Annotated[File, Parameter(help=f"Write a {words} to this {suffixes} file.")], None
-
-
 _FORMAT_FILES = make_dataclass(
     "_FORMAT_FILES",
-    map(_file, FORMATS),
+    [
+        (
+            name,
+            Annotated[
+                File,
+                Parameter(help=f"Write a {form.text} to this {' or '.join(form.suffixes)} file."),
+            ],
+            None,
+        )
+        for name, form in FORMATS.items()
+    ],
     bases=(Outputs,),
     frozen=True,
     namespace={"__module__": __name__},  # cyclopts looks into no class of the standard library

@@ -101,7 +101,7 @@ def examination() -> dict[str, Any]:
             "programs": kept.programs,
             "bytes": kept.size,
             "most_bytes": store.MAX_BYTES,
-            "shipped": store.count_shipped(),
+            "shipped": len([*store.SHIPPED.glob("*.xz")]),
         },
     }
 

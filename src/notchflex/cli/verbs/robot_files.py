@@ -175,29 +175,24 @@ def new(
         text = read_text(_PACKAGE / folder / "template.toml", words)
         following = f"Edit it, then run: {command}"
     else:
-        text = _asked(path.stem, answers, set_, yes)
+        from notchflex.cli.interview import Interview, commented
+
+        values = dict(map(_setting, set_))
+        options = {f"--{key.replace('_', '-')}": answer for key, answer in vars(answers).items()}
+        interview = Interview(values | options, accept_defaults=yes)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", InputWarning)
+            robot = interview.conduct(path.stem)
+        warn_unlikely(robot)
+        for option in sorted(interview.unused):
+            raise InputError.UNKNOWN_NAME(
+                f"{option}: no part of this robot asks for it: it is one of another kind, or an "
+                "option that it goes with is missing or stands in its place."
+            )
+        text = commented(robot_text(robot), interview.answered)
         following = "Look at it with: notchflex show {}"
     write_text(path, text)
     print(f"Wrote {path}. {following.format(shlex.quote(str(path)))}")
-
-
-def _asked(name: str, answers: Answers, settings: tuple[str, ...], accept_defaults: bool) -> str:
-    """Return the text of the robot file that answers describe."""
-    from notchflex.cli.interview import Interview, commented
-
-    values = dict(map(_setting, settings))
-    options = {f"--{key.replace('_', '-')}": answer for key, answer in vars(answers).items()}
-    interview = Interview(values | options, accept_defaults=accept_defaults)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", InputWarning)
-        robot = interview.conduct(name)
-    warn_unlikely(robot)
-    for option in sorted(interview.unused):
-        raise InputError.UNKNOWN_NAME(
-            f"{option}: no part of this robot asks for it: it is one of another kind, or an option "
-            "that it goes with is missing or stands in its place."
-        )
-    return commented(robot_text(robot), interview.answered)
 
 
 def _setting(text: str) -> tuple[str, str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,6 +18,7 @@ from notchflex.fit.measurements.measurements import MEASURED, Measurements, Numb
 from notchflex.support import (
     AXES,
     QUANTITIES,
+    AnyPath,
     ExternalLoad,
     Table,
     check_is_path,
@@ -301,7 +301,7 @@ class MeasurementReader:
 
 
 def read_measurements(
-    source: str | os.PathLike[str],
+    source: AnyPath,
     robot: Robot,
     *,
     from_rest: bool | None = None,

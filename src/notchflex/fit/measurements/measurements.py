@@ -148,8 +148,20 @@ class Measurements:
             )
         values["pull"] = check_labels(self.pull, rows, "rows")
         for name in ("observed", "deviation"):
-            tables = values[name].items()
-            values[name] = {key: _checked(value, key, rows) for key, value in tables}
+            check_quantities(values[name])
+            tables = {key: np.array(value, float) for key, value in values[name].items()}
+            for key, table in tables.items():
+                quantity = MEASURED[key]
+                fits = table.ndim == 1 + len(quantity.per) and len(table) == rows
+                if not fits or (quantity.is_vector and table.shape[-1] != 3):
+                    raise InputError.WRONG_SHAPE(
+                        f"{key} of {rows} rows cannot have the shape {table.shape}"
+                    )
+                if np.isinf(table).any():
+                    raise InputError.NOT_FINITE(
+                        f"{key} holds an infinite number; give NaN where nothing was measured"
+                    )
+            values[name] = tables
         if not self.values:
             raise InputError.NO_DATA(f"nothing is measured; give some of {', '.join(OBSERVED)}")
         points = self.observed.get("axis_points", np.zeros((0, 0))).shape[1]
@@ -324,19 +336,6 @@ def check_quantities(names: Iterable[str]) -> None:
             raise InputError.UNKNOWN_NAME(
                 f"`{name}` is nothing that is measured; there are {', '.join(OBSERVED)}"
             )
-
-
-def _checked(value: Any, name: str, rows: int) -> Numbers:
-    check_quantities([name])
-    array, quantity = np.array(value, float), MEASURED[name]
-    fits = array.ndim == 1 + len(quantity.per) and len(array) == rows
-    if not fits or (quantity.is_vector and array.shape[-1] != 3):
-        raise InputError.WRONG_SHAPE(f"{name} of {rows} rows cannot have the shape {array.shape}")
-    if np.isinf(array).any():
-        raise InputError.NOT_FINITE(
-            f"{name} holds an infinite number; give NaN where nothing was measured"
-        )
-    return array
 
 
 @dataclass(frozen=True, eq=False)

@@ -183,7 +183,13 @@ def _between(values: Numbers, comparable: list[list[Curve]]) -> float:
     """Variance between pulls, averaged over the loads that at least two of them cover."""
     total, freedom = 0.0, 0.0
     for curves in comparable:
-        means = [pull for pull in (_means(values, *curve) for curve in curves) if len(pull[0]) > 1]
+        means = list[tuple[Numbers, Numbers]]()  # of what was measured at loads, each once
+        for load, rows in curves:
+            is_known = ~np.isnan(values[rows])
+            loads, number = np.unique(load[is_known], return_inverse=True)
+            if len(loads) > 1:
+                total_there = np.bincount(number, values[rows][is_known])
+                means.append((loads, total_there / np.bincount(number)))
         if len(means) < 2:
             continue
         knots = np.unique(np.concatenate([loads for loads, _ in means]))
@@ -197,10 +203,3 @@ def _between(values: Numbers, comparable: list[list[Curve]]) -> float:
             total += (high - low) * float(squares @ [1.0, 4.0, 1.0]) / 6.0
             freedom += (high - low) * (len(covering) - 1)
     return total / freedom if freedom else float("nan")
-
-
-def _means(values: Numbers, load: Numbers, rows: Integers) -> tuple[Numbers, Numbers]:
-    """Loads, each once, and means of what was measured there."""
-    is_known = ~np.isnan(values[rows])
-    loads, number = np.unique(load[is_known], return_inverse=True)
-    return loads, np.bincount(number, values[rows][is_known]) / np.bincount(number)

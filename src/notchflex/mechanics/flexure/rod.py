@@ -221,7 +221,6 @@ class Site(NamedTuple):
 @singledispatch
 def rod(notch: Any, tube: Tube, refinement: int = 0, site: Site | None = None) -> Rod:
     """Rod of one notch."""
-    del tube, refinement, site
     raise unregistered("rod", notch, "flexure", "rod")
 
 
@@ -234,14 +233,12 @@ def rod_at(site: Site | None, notch: Any, tube: Tube, refinement: int = 0) -> Ro
 @singledispatch
 def section_fibres(notch: Any, tube: Tube) -> FibresAt:
     """Fibres about any axis, a function of the distances of the edges (mm) and their number."""
-    del tube
     raise unregistered("section of fibres", notch, "flexure", "section_fibres")
 
 
 @singledispatch
 def validity_warnings(notch: Any, tube: Tube, site: Site) -> list[str]:
     """List in sentences the dimensions for which the law of elastic ends was not checked."""
-    del notch, tube, site
     return []
 
 
@@ -256,5 +253,4 @@ def law_error(notch: Any, tube: Tube, site: Site, yields: bool) -> float:
         yields: Whether its material is one of fibres.
     """
     # Strips and links: root mean square over cells that were computed when the law stood.
-    del notch, tube, site, yields
     return 0.027

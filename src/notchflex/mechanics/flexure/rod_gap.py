@@ -30,7 +30,6 @@ from notchflex.robot import RodGap, Tube
 
 @rod.register
 def _(notch: RodGap, tube: Tube, refinement: int = 0, site: Site | None = None) -> Rod:
-    del tube, site
     length = notch.length
     points = rod_quadrature((0.0, length), (5 + refinement,), (5 + 3 * refinement,))
     polynomials = legendre(2.0 * points.positions / length - 1.0, 3 + refinement)
@@ -78,7 +77,6 @@ def ring_section(outer_diameter: Any, inner_diameter: Any) -> FibreSection:
 
 @section_fibres.register
 def _(notch: RodGap, tube: Tube) -> FibresAt:
-    del tube
 
     def fibres(_near: Any, _spine: Any, count: int) -> Points:
         # Points of rings; by symmetry those of half a ring.

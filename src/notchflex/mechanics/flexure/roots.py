@@ -311,7 +311,6 @@ def rooted_strip_rod(
 
 @section_fibres.register
 def _(notch: StripNotch | ULink, tube: Tube) -> FibresAt:
-    del notch, tube
     return two_walls_fibres
 
 

@@ -87,7 +87,6 @@ def strip_rod(
 
 @validity_warnings.register
 def _(notch: StripNotch, tube: Tube, site: Site) -> list[str]:
-    del site
     if not notch.has_elastic_ends:  # a model of a paper
         return []
     thickness, outer = notch.strip_thickness, tube.outer_diameter

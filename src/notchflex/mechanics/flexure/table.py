@@ -145,7 +145,6 @@ def _(notch: TableNotch) -> TableLaw:
 
 @rod.register
 def _(notch: TableNotch, tube: Tube, refinement: int = 0, site: Site | None = None) -> Rod:
-    del refinement, site
     points = rod_quadrature((0.0, notch.length), (1,), (10,))
     free = [k for k in (*_PLANAR, 0, 2, 4) if np.isfinite(_stiffness(notch)[k, k])]
     few = sum(k in _PLANAR for k in free) if notch.stays_in_plane else len(free)
@@ -172,5 +171,4 @@ def _(notch: TableNotch, tube: Tube, refinement: int = 0, site: Site | None = No
 @section_fibres.register
 def _(notch: TableNotch, tube: Tube) -> FibresAt:
     # Fibres of any rectangle: where other notches have a law of fibres, it is evaluated here too.
-    del notch, tube
     return two_walls_fibres

@@ -232,7 +232,6 @@ def u_link_rod(
 
 @validity_warnings.register
 def _(notch: ULink, tube: Tube, site: Site) -> list[str]:
-    del site
     if not notch.has_elastic_ends:  # a model of a paper
         return []
     thickness, length = notch.strip_thickness, notch.strip_length

@@ -35,7 +35,6 @@ class FrictionLaw(Pytree, ABC):
 
     def constant_loss(self, turning: AtEdges) -> AtEdges | None:
         """Return the tension that sliding costs beside `bounds`, N, >= 0; None for none."""
-        del turning
 
     def offset(self) -> Float[Array, ""] | float:
         """Return what is added to tensions in their ratios, N: the loss at a turning of 1 rad."""
@@ -83,5 +82,4 @@ class FrictionlessLaw(FrictionLaw):
 
 @friction_law.register
 def _(friction: Frictionless) -> FrictionlessLaw:
-    del friction
     return FrictionlessLaw()

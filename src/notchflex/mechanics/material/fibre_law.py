@@ -120,7 +120,6 @@ def _(size: int, batched: Any, law: FibreLaw, *sections: Any) -> tuple[Any, Any]
 def same_sums(sums: FibreSums, *of: Any) -> FibreSums:
     """Return known sums over fibres, with the derivatives of the summation."""
     # Without differentiation nothing is summed or traced.
-    del of
     return sums
 
 

@@ -361,12 +361,10 @@ class Law(Pytree):
 
     def rest(self, section: FibreSection) -> Any:
         """Return the memory of a free section, or of many; () for laws without memory."""
-        del section
         return ()
 
     def dissipated(self, section: FibreSection, before: Any, after: Any) -> Any:
         """Return the energy per length lost between two memories, N mm/mm; for plain arrays."""
-        del before, after
         return xp.zeros(xp.shape(section.area))
 
     @property

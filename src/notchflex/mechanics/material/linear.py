@@ -19,7 +19,6 @@ class LinearLaw(SectionLaw):
 
     def bending_energy(self, curvature: Scalar, section: FibreSection, memory: Any) -> Scalar:
         """Return half the product of moment and curvature."""
-        del memory
         return 0.5 * curvature * self.moment(curvature, section)
 
 

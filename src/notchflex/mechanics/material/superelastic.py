@@ -81,7 +81,6 @@ class SuperelasticLaw(SectionLaw):
 
     def bending_energy(self, curvature: Scalar, section: FibreSection, memory: Any) -> Scalar:
         """Return the area under the moment over the curvature."""
-        del memory
         density = self.energy_density(curvature * section.edge_spine)
         return section.second_moment_weak / section.edge_spine**2 * density
 

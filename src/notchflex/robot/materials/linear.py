@@ -4,7 +4,7 @@ from dataclasses import KW_ONLY
 from typing import Annotated, Literal
 
 from notchflex.robot.kinds import Material
-from notchflex.robot.part import Float, part, quantity
+from notchflex.robot.part import Float, part, positive
 
 
 @part
@@ -25,8 +25,6 @@ class Linear(Material):
         60000.0
     """
 
-    elastic_modulus: Annotated[
-        Float, quantity("MPa", "Young's modulus", above=0, usual=(200, 300_000))
-    ]
+    elastic_modulus: Annotated[Float, positive("MPa", "Young's modulus", usual=(200, 300_000))]
     _: KW_ONLY
     kind: Literal["linear"] = "linear"

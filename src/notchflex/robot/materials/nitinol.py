@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from notchflex.errors import InputError
 from notchflex.robot.kinds import Material, Transforming, celsius
-from notchflex.robot.part import MOST_STRAIN, Float, Problems, part, quantity
+from notchflex.robot.part import MOST_STRAIN, Float, Problems, part, positive, quantity
 
 
 @part
@@ -45,24 +45,24 @@ class Nitinol(Transforming, Material):
     """
 
     elastic_modulus: Annotated[
-        Float, quantity("MPa", "Young's modulus up to the plateau", above=0, usual=(200, 300_000))
+        Float, positive("MPa", "Young's modulus up to the plateau", usual=(200, 300_000))
     ] = 42_000.0
     plateau_stress: Annotated[
         Float,
-        quantity("MPa", "stress in tension where the plateau begins", above=0, usual=(10, 2_000)),
+        positive("MPa", "stress in tension where the plateau begins", usual=(10, 2_000)),
     ] = 350.0
     plateau_modulus: Annotated[Float, quantity("MPa", "slope of the plateau", at_least=0)] = 6_000.0
     compression_ratio: Annotated[
         Float,
-        quantity("", "plateau stress in compression over that in tension", above=0, at_most=10.0),
+        positive("", "plateau stress in compression over that in tension", at_most=10.0),
     ] = 1.0
     unloading_stress: Annotated[
         Float | None,
-        quantity("MPa", "stress in tension where the plateau of unloading ends", above=0),
+        positive("MPa", "stress in tension where the plateau of unloading ends"),
     ] = None
     transformation_strain: Annotated[
         Float | None,
-        quantity("", "strain where the plateau of loading ends", above=0, at_most=MOST_STRAIN),
+        positive("", "strain where the plateau of loading ends", at_most=MOST_STRAIN),
     ] = None
     _: KW_ONLY
     kind: Literal["nitinol"] = "nitinol"
@@ -122,11 +122,11 @@ class TensileTest:
 
     upper_plateau: Annotated[
         Float | None,
-        quantity("MPa", "upper plateau of a data sheet: stress at 3 % strain", above=0),
+        positive("MPa", "upper plateau of a data sheet: stress at 3 % strain"),
     ] = None
     lower_plateau: Annotated[
         Float | None,
-        quantity("MPa", "lower plateau: stress at 2.5 % strain, unloading from 6 %", above=0),
+        positive("MPa", "lower plateau: stress at 2.5 % strain, unloading from 6 %"),
     ] = None
     test_temperature: Annotated[Float | None, celsius("temperature of the test")] = None
 

@@ -4,7 +4,7 @@ from dataclasses import KW_ONLY
 from typing import Annotated, ClassVar, Literal
 
 from notchflex.robot.kinds import PACHECO, Material, Transforming
-from notchflex.robot.part import MOST_STRAIN, Float, Problems, part, quantity
+from notchflex.robot.part import MOST_STRAIN, Float, Problems, part, positive, quantity
 
 
 @part
@@ -43,21 +43,17 @@ class Superelastic(Transforming, Material):
     """
 
     elastic_modulus: Annotated[
-        Float, quantity("MPa", "modulus of the elastic branch", above=0, usual=(200, 300_000))
+        Float, positive("MPa", "modulus of the elastic branch", usual=(200, 300_000))
     ]
-    superelastic_modulus: Annotated[
-        Float, quantity("MPa", "modulus of the superelastic branch", above=0)
-    ]
+    superelastic_modulus: Annotated[Float, positive("MPa", "modulus of the superelastic branch")]
     transition_strain: Annotated[
         Float,
-        quantity("", "strain where the superelastic branch begins", above=0, at_most=MOST_STRAIN),
+        positive("", "strain where the superelastic branch begins", at_most=MOST_STRAIN),
     ]
     plastic_strain: Annotated[
-        Float, quantity("", "strain where the plastic branch begins", above=0, at_most=MOST_STRAIN)
+        Float, positive("", "strain where the plastic branch begins", at_most=MOST_STRAIN)
     ] = 0.10
-    plastic_modulus: Annotated[Float, quantity("MPa", "modulus of the plastic branch", above=0)] = (
-        1000.0
-    )
+    plastic_modulus: Annotated[Float, positive("MPa", "modulus of the plastic branch")] = 1000.0
     plastic_exponent: Annotated[
         Float, quantity("", "exponent of the plastic branch (beta)", below=0)
     ] = -0.01

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from notchflex.robot.cuts import CutLayout, slot
 from notchflex.robot.kinds import PACHECO, YORK, Notch, Tube
-from notchflex.robot.part import Float, Problems, part, quantity
+from notchflex.robot.part import Float, Problems, part, positive
 
 
 @part
@@ -51,13 +51,9 @@ class ArcNotch(Notch):
     ]
     depth: Annotated[
         Float,
-        quantity(
-            "mm", "depth of the cut, from the surface opposite the spine", above=0, usual=(0.01, 50)
-        ),
+        positive("mm", "depth of the cut, from the surface opposite the spine", usual=(0.01, 50)),
     ]
-    height: Annotated[
-        Float, quantity("mm", "height of the notch along the tube", above=0, usual=(0.01, 50))
-    ]
+    height: Annotated[Float, positive("mm", "height of the notch along the tube", usual=(0.01, 50))]
     _: KW_ONLY
     kind: Literal["arc"] = "arc"
     ends: Annotated[

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from notchflex.robot.cuts import CutLayout, whole_gap
 from notchflex.robot.kinds import Notch, Tendon, Tube
-from notchflex.robot.part import Float, Problems, part, quantity
+from notchflex.robot.part import Float, Problems, part, positive, quantity
 
 
 @part
@@ -34,12 +34,8 @@ class RodGap(Notch):
         20.0
     """
 
-    length: Annotated[
-        Float, quantity("mm", "free length of the backbone", above=0, usual=(0.1, 500))
-    ]
-    diameter: Annotated[
-        Float, quantity("mm", "outer diameter of the backbone", above=0, usual=(0.05, 50))
-    ]
+    length: Annotated[Float, positive("mm", "free length of the backbone", usual=(0.1, 500))]
+    diameter: Annotated[Float, positive("mm", "outer diameter of the backbone", usual=(0.05, 50))]
     inner_diameter: Annotated[
         Float, quantity("mm", "inner diameter of the backbone; 0 is round", at_least=0)
     ] = 0.0
@@ -79,7 +75,7 @@ class RodGap(Notch):
 
     def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
         """Return the whole gap, in which only the backbone is left."""
-        return whole_gap(tube.outer_radius, self.direction_deg, self.length, self.uncut_length)
+        return whole_gap(self, tube.outer_radius)
 
     def tendon_problems(self, tendon: Tendon) -> Problems:
         """Find a tendon on an arc of the wall, which is not there."""

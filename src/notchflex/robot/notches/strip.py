@@ -7,7 +7,7 @@ from pydantic import Field
 
 from notchflex.robot.cuts import CutLayout, NotchCut, Opening, cosine_of
 from notchflex.robot.kinds import LIU, Notch, Tendon, Tube
-from notchflex.robot.part import Float, Problems, part, quantity
+from notchflex.robot.part import Float, Problems, part, positive, quantity
 
 LEAST_COSINE = 0.5  # a cable farther round the tube than 60 deg would twist the strip
 
@@ -51,20 +51,18 @@ class StripNotch(Notch):
         8.0
     """
 
-    height: Annotated[Float, quantity("mm", "opening of a notch at the outer surface", above=0)]
-    strip_thickness: Annotated[
-        Float, quantity("mm", "thickness of the strip along the tube", above=0)
-    ]
+    height: Annotated[Float, positive("mm", "opening of a notch at the outer surface")]
+    strip_thickness: Annotated[Float, positive("mm", "thickness of the strip along the tube")]
     depth: Annotated[
-        Float, quantity("mm", "depth of each of the two opposite cuts, from the surface", above=0)
+        Float, positive("mm", "depth of each of the two opposite cuts, from the surface")
     ]
     strip_length: Annotated[
         Float | None,
-        quantity("mm", "length of the strip across the tube; left out: (D + d) / 2", above=0),
+        positive("mm", "length of the strip across the tube; left out: (D + d) / 2"),
     ] = None
     wall_width: Annotated[
         Float | None,
-        quantity("mm", "width of both walls of the strip together; left out: D - d", above=0),
+        positive("mm", "width of both walls of the strip together; left out: D - d"),
     ] = None
     deflection: Annotated[
         Literal["large", "small"],

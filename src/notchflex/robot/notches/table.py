@@ -10,7 +10,7 @@ from pydantic import Field
 
 from notchflex.robot.cuts import CutLayout, whole_gap
 from notchflex.robot.kinds import Material, Notch, Tube
-from notchflex.robot.part import Float, FloatOrInf, Problems, part, quantity
+from notchflex.robot.part import Float, FloatOrInf, Problems, part, positive, quantity
 
 COLUMNS = ("angle_deg", "moment_Nmm")
 """Columns of a file of the curve, and the keys that hold it."""
@@ -53,7 +53,7 @@ class TableNotch(Notch):
         ((-20.0, -5.0, 0.0, 5.0, 20.0), (-3.0, -1.0, 0.0, 1.0, 3.0))
     """
 
-    length: Annotated[Float, quantity("mm", "length along the neutral axis", above=0)]
+    length: Annotated[Float, positive("mm", "length along the neutral axis")]
     angle_deg: Annotated[
         tuple[Annotated[Float, quantity("deg", "angle", above=-180, below=180)], ...] | None,
         Field(description="angles of bending, rising", json_schema_extra={"unit": "deg"}),
@@ -76,7 +76,7 @@ class TableNotch(Notch):
         Float, quantity("mm", "distance of the neutral axis from the tube axis, off the bend")
     ] = 0.0
     closing_angle_deg: Annotated[
-        Float | None, quantity("deg", "angle at which it closes", above=0, below=180)
+        Float | None, positive("deg", "angle at which it closes", below=180)
     ] = None
 
     @property
@@ -86,7 +86,6 @@ class TableNotch(Notch):
 
     def made_of(self, material: Material) -> Any:
         """Return itself: its numbers are its law."""
-        del material
         return self
 
     @property
@@ -104,7 +103,7 @@ class TableNotch(Notch):
 
     def cut_layout(self, tube: Tube, before: Notch | None, after: Notch | None) -> CutLayout:
         """Return the whole gap: what fills it is not known."""
-        return whole_gap(tube.outer_radius, self.direction_deg, self.length, self.uncut_length)
+        return whole_gap(self, tube.outer_radius)
 
     @property
     def stays_in_plane(self) -> bool:
@@ -145,7 +144,6 @@ class TableNotch(Notch):
 
     def problems(self, tube: Tube) -> Problems:
         """Find a free shape beyond the closing angle."""
-        del tube
         if self.closing_angle_deg is not None and self.precurvature_deg >= self.closing_angle_deg:
             yield (
                 "precurvature_deg",

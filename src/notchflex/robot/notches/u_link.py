@@ -9,7 +9,7 @@ from pydantic import Field
 
 from notchflex.robot.cuts import CutLayout, Opening, cosine_of, slot
 from notchflex.robot.kinds import GAO, Notch, Tendon, Tube
-from notchflex.robot.part import Float, Problems, part, quantity, unchecked
+from notchflex.robot.part import Float, Problems, part, positive, quantity, unchecked
 
 OTHER = {"away": "toward", "toward": "away"}
 
@@ -49,14 +49,10 @@ class ULink(Notch):
     """
 
     slot_radius: Annotated[
-        Float, quantity("mm", "radius of the slot ends, half the width of a slot", above=0)
+        Float, positive("mm", "radius of the slot ends, half the width of a slot")
     ]
-    strip_thickness: Annotated[
-        Float, quantity("mm", "thickness of the strip along the tube", above=0)
-    ]
-    strip_length: Annotated[
-        Float, quantity("mm", "length of the straight middle of the strip", above=0)
-    ]
+    strip_thickness: Annotated[Float, positive("mm", "thickness of the strip along the tube")]
+    strip_length: Annotated[Float, positive("mm", "length of the straight middle of the strip")]
     proximal_slot: Annotated[
         Literal["away", "toward"],
         Field(

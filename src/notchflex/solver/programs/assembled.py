@@ -227,7 +227,6 @@ def tracing_told() -> Generator[None]:
 @lru_cache(maxsize=32)
 def _known(form: PartsForm, *loads: Any) -> list[AssembledRobots]:
     """Return the list of the programs that are known for a form; it begins empty."""
-    del form, loads
     return []
 
 

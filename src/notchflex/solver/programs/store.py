@@ -148,11 +148,6 @@ def record(key: str, content: bytes) -> None:
         path.write_bytes(lzma.compress(content, preset=2))
 
 
-def count_shipped() -> int:
-    """Return the number of programs in the package."""
-    return sum(1 for _ in SHIPPED.glob("*.xz"))
-
-
 def _shipped_name(key: str) -> str:
     return hashlib.sha256(f"{code_digest()} {key}".encode()).hexdigest()[:32] + ".xz"
 
