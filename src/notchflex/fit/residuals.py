@@ -119,7 +119,7 @@ class Sample:
             command = SENSOR[name].command
             value, step = getattr(load, command), 1.0 if name == "sensor.force_factor" else -1.0
             moved = getattr(self._load({**numbers, name: numbers[name] + step}), command)
-            # Below 0 N the robot has no tension, whatever the sensor shows; strokes are released too.
+            # Whatever the sensor shows, no tension is below 0 N; tendons are also released.
             acts = (command == "stroke") | (value > 0.0)
             moved = replace(load, **{command: np.where(acts, moved, value)})
             for row in np.flatnonzero(along[:, names.index(name)]):
