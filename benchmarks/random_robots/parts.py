@@ -207,8 +207,18 @@ def _own_parts(random: np.random.Generator, robot: Table, material: Callable[[],
             notch["material"] = dict(own)
 
 
-def mix_others(random: np.random.Generator, robot: Table, planar: bool, tension: float) -> None:
-    """Give a robot with tendons holes in its disks, sheaths, a spool, a temperature and a line."""
+def mix_others(
+    random: np.random.Generator, robot: Table, planar: bool, tension: float, force: float
+) -> None:
+    """Give a robot with tendons holes in its disks, sheaths, a spool, a temperature and a line.
+
+    Args:
+        random: Where numbers are from.
+        robot: The robot; changed.
+        planar: Whether it stays in a plane.
+        tension: A tension that bends it far, N.
+        force: A force on its tip that does, N.
+    """
     _holes(random, robot, planar)
     outer, elastic = robot["tube"]["outer_diameter"], tension * _decades(random, 10.0, 1e5)
     if random.random() < 0.4:
@@ -216,7 +226,8 @@ def mix_others(random: np.random.Generator, robot: Table, planar: bool, tension:
         for tendon in robot["tendon"]:
             if every or random.random() < 0.5:
                 tendon |= _sheath(random, outer, elastic)
-    if len(robot["tendon"]) > 1 and random.random() < 0.4:
+    # The pretension of a spool has a least value, 1e-6 N, of a robot made smaller too.
+    if len(robot["tendon"]) > 1 and tension > 0.25 and random.random() < 0.4:
         for tendon in robot["tendon"][:2]:
             if "sheath_length" not in tendon:
                 tendon.setdefault("axial_stiffness", elastic)
@@ -231,7 +242,7 @@ def mix_others(random: np.random.Generator, robot: Table, planar: bool, tension:
             part["material"] |= _temperature(random, part["material"])
     for notch in robot["notch"]:
         if notch["kind"] == "rod" and random.random() < 0.4 and robot["material"].get("density"):
-            weight = 0.3 * tension / len(robot["notch"]) / notch["repeat"]
+            weight = force / len(robot["notch"]) / notch["repeat"]
             notch["disk_mass"] = weight / 9.81e-3 * _decades(random, 0.01, 1.0)
     if random.random() < 0.5:
         robot["fatigue"] = _line(random, outer)
