@@ -489,20 +489,18 @@ def draw_outside(random: np.random.Generator, robot: Table, planar: bool, frame:
                 for _ in range(count)
             ]
     heavy = robot["material"].get("density") is not None or "tip_mass" in load
-    if "gravity" in load and not heavy and random.random() < 0.9:
+    if "gravity" in load and not heavy:
         del load["gravity"]  # nothing to act on, which is refused
     load["following"] = frame.following
     return load
 
 
 def scaled(load: Table, factor: float) -> Table:
-    """Return external loads with forces, moments and masses times a factor."""
+    """Return external loads with forces and moments times a factor; a mass stays."""
     load = dict(load)
     for key in ("tip_force", "tip_moment"):
         if key in load:
             load[key] = load[key] * factor
-    if "tip_mass" in load:
-        load["tip_mass"] = load["tip_mass"] * abs(factor)
     if "body_forces" in load:
         load["body_forces"] = [
             part | {"force": part["force"] * factor, "moment": part["moment"] * factor}
