@@ -17,6 +17,8 @@ Table = dict[str, Any]
 _MOST_GAPS = 12
 # A table ends beyond the angle at which it closes, mostly: beyond its ends nothing is computed.
 _CLOSES = 0.9
+# Half a turn, deg: the free backbone of a row of gaps does not meet itself.
+_FREE_BEND = 180.0
 
 
 def mix_notches(
@@ -68,6 +70,10 @@ def mix_notches(
         if random.random() < 0.3:
             gap = _gap(random, robot, planar, usual * _decades(random, 0.5, 30.0), material)
             notches.append(gap)
+    for notch in notches:
+        if notch["kind"] == "rod" and "precurvature_deg" in notch:
+            most = _FREE_BEND / notch["repeat"]
+            notch["precurvature_deg"] = float(np.clip(notch["precurvature_deg"], -most, most))
     if random.random() < 0.35:
         _own_parts(random, robot, material)
 
@@ -343,8 +349,9 @@ def mix_loads(
     steps = len(loads)
     warms, bends, turns = form.random(3)
     material = robot["material"]
+    of_tube = [notch["kind"] != "table" and "material" not in notch for notch in robot["notch"]]
     own = any("material" in notch for notch in robot["notch"])
-    if "reference_temperature" in material and not own and warms < 0.7:
+    if "reference_temperature" in material and any(of_tube) and not own and warms < 0.7:
         course = random.uniform(-20.0, 60.0, steps)
         held = int(random.integers(0, steps))
         course[held:] = course[held]

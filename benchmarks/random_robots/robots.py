@@ -313,13 +313,16 @@ def pulling_together(robot: Table) -> float:
 
 
 def most_stroke(robot: Table, tension: float, tendon: Table) -> float:
-    """Return what a tendon is drawn [mm] where all that it passes closes or bears a tension."""
-    stroke, left = 0.0, tendon.get("end_body", math.inf)
-    for notch in robot["notch"]:
-        stiff, angle, lever = reference(robot, notch)
-        passed = min(notch["repeat"], left)
-        stroke += passed * lever * min(angle, tension * lever / stiff)
-        left -= passed
+    """Return what a tendon is drawn [mm] where all that it passes closes or bears a tension.
+
+    Friction takes of the tension on the way.
+    """
+    rows = [reference(robot, notch) for notch in robot["notch"] for _ in range(notch["repeat"])]
+    stroke, coefficient = 0.0, robot["friction"].get("coefficient", 0.0)
+    for stiff, angle, lever in rows[: tendon.get("end_body")]:
+        bend = min(angle, tension * lever / stiff)
+        stroke += lever * bend
+        tension *= math.exp(-coefficient * bend)
     return stroke
 
 
