@@ -9,10 +9,11 @@ degrees. Some draws are no robots and are refused.
 
 Loads go up to the range of the model. A notch that closes bears any tension in its plane: these go
 up to three times what closes half of the notches, and now and then far beyond. Nothing stops gaps,
-tables, and out of the plane a notch that is bent to its side: there all tendons together pull no
-more than what bends the softest gap or table to its range, or three times what closes the softest
-notch, and draw no more than that tension does. All loads from outside together have at most the
-moment that closes the softest notch, or bends the softest gap or table to its range.
+tables, and out of the plane a notch that is bent to its side. There tendons together pull no more
+than what bends the softest gap or table to its range, or three times what closes the softest notch;
+they press on no gap so that it buckles; and they draw no more than such tensions do. All loads from
+outside together have at most the moment that closes the softest notch, or bends the softest gap or
+table to its range.
 """
 
 from __future__ import annotations
@@ -41,8 +42,10 @@ NOTCHES = {
     "table": nf.TableNotch,
 }
 ROUND = {"arc", "rod", "table"}  # kinds over which a tendon may lie on any side
-# How many times what closes the softest notch may pull, where it may bend to its side.
-_SIDEWAYS = 3.0
+# How many times what closes the softest notch may pull, where it may bend to its side; and what all
+# tendons together may press on a gap, times its length over its stiffness: held at one end it would
+# buckle at pi**2 / 4.
+_SIDEWAYS, _UPRIGHT = 3.0, 2.0
 STIFF = (
     "elastic_modulus",
     "superelastic_modulus",
@@ -297,19 +300,18 @@ def tension_scale(robot: Table, planar: bool) -> float:
 
 
 def most_tension(robot: Table, planar: bool) -> float:
-    """Return what all tendons together may pull [N] where nothing stops what they bend."""
+    """Return what every tendon may pull [N] where nothing stops what they bend."""
+    sides = np.radians([tendon["direction_deg"] for tendon in robot["tendon"]])
+    # How many pull toward one side, at most; by the cosine beside it.
+    together = np.maximum(np.cos(np.subtract.outer(sides, sides)), 0.0).sum(0).max()
     most = []
     for notch in robot["notch"]:
         stiff, angle, lever = reference(robot, notch)
         times = 1.0 if notch["kind"] in ("rod", "table") else math.inf if planar else _SIDEWAYS
-        most.append(times * stiff * angle / lever)
-    return min(most)
-
-
-def pulling_together(robot: Table) -> float:
-    """Return how many tendons pull toward one side, at most; by the cosine beside it."""
-    sides = np.radians([tendon["direction_deg"] for tendon in robot["tendon"]])
-    return float(np.maximum(np.cos(np.subtract.outer(sides, sides)), 0.0).sum(0).max())
+        most.append(times * stiff * angle / lever / together)
+        if notch["kind"] in ("rod", "table"):
+            most.append(_UPRIGHT * stiff / notch["length"] / len(sides))
+    return float(min(most))
 
 
 def most_stroke(robot: Table, tension: float, tendon: Table) -> float:
@@ -523,7 +525,7 @@ def draw_history(
     size = float(np.exp(random.uniform(np.log(1e-3), np.log(3.0))))
     if random.random() < 0.04:
         size *= float(10 ** random.uniform(2, 6))
-    most = most_tension(robot, planar) / pulling_together(robot)
+    most = most_tension(robot, planar)
     told: Table = {
         "tension": np.full((steps, tendons), np.nan),
         "stroke": np.full((steps, tendons), np.nan),
@@ -586,7 +588,7 @@ def tables_of(seed: int, number: int) -> tuple[Table, list[Table], str]:
     form += " elastic ends" if from_drawing else ""
     form += "".join(f" {word}" for word in mixed_words(robot))
     history = draw_history(random, robot, planar, frame)
-    most = most_tension(robot, planar) / pulling_together(robot)
+    most = most_tension(robot, planar)
     stroke = min(most_stroke(robot, most, tendon) for tendon in robot["tendon"][:2])
     mix_loads(mixed, random, robot, history, stroke)
     return robot, history, form
