@@ -43,9 +43,9 @@ NOTCHES = {
 }
 ROUND = {"arc", "rod", "table"}  # kinds over which a tendon may lie on any side
 # How many times what closes the softest notch may pull, where it may bend to its side; and what all
-# tendons together may press on a gap, times its length over its stiffness: held at one end it would
-# buckle at pi**2 / 4.
-_SIDEWAYS, _UPRIGHT = 3.0, 2.0
+# tendons together may press on a gap, times its length over its stiffness: hinged at both ends it
+# would buckle at pi**2, and bends to its side before.
+_SIDEWAYS, _UPRIGHT = 3.0, 3.0
 STIFF = (
     "elastic_modulus",
     "superelastic_modulus",
