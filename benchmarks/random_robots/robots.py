@@ -12,8 +12,8 @@ up to three times what closes half of the notches, and now and then far beyond. 
 tables, and out of the plane a notch that is bent to its side. There tendons together pull no more
 than what bends the softest gap or table to its range, or three times what closes the softest notch;
 they press on no gap so that it buckles; and they draw no more than such tensions do. All loads from
-outside together have at most the moment that closes the softest notch, or bends the softest gap or
-table to its range.
+outside together have at most the moment that closes the softest notch, bends the softest gap or
+table to its range, or twists an arc notch by half a radian.
 """
 
 from __future__ import annotations
@@ -46,6 +46,8 @@ ROUND = {"arc", "rod", "table"}  # kinds over which a tendon may lie on any side
 # tendons together may press on a gap, times its length over its stiffness: hinged at both ends it
 # would buckle at pi**2, and bends to its side before.
 _SIDEWAYS, _UPRIGHT = 3.0, 3.0
+# How far loads from outside may twist an arc notch, rad.
+_TWISTED = 0.5
 STIFF = (
     "elastic_modulus",
     "superelastic_modulus",
@@ -418,10 +420,18 @@ def draw_course(random: np.random.Generator, steps: int, both_signs: bool) -> np
     return course
 
 
-def sizes_of(robot: Table) -> tuple[float, float]:
+def sizes_of(robot: Table, planar: bool) -> tuple[float, float]:
     """Return moment (N mm) and force (N) that are large for a robot."""
     rows = [reference(robot, notch) for notch in robot["notch"]]
-    moment = min(stiff * angle for stiff, angle, _ in rows)
+    moments = [stiff * angle for stiff, angle, _ in rows]
+    for notch in robot["notch"]:
+        if notch["kind"] == "arc" and not planar:  # open sections twist before they bend
+            tube, material = (notch.get(key, robot[key]) for key in ("tube", "material"))
+            radii = tube["outer_diameter"] / 2, tube["inner_diameter"] / 2
+            left = section_of(notch["cut"], *radii, notch["depth"])
+            shear = elastic_modulus(material) / (2.0 + 2.0 * material.get("poisson_ratio", 0.3))
+            moments.append(_TWISTED * shear * left.torsion / notch["height"])
+    moment = min(moments)
     length = robot["tube"]["base_length"] + robot["tube"]["outer_diameter"] * 0.5
     for notch in robot["notch"]:
         piece = notch.get("length", notch.get("height", 2 * notch.get("slot_radius", 0.0)))
@@ -461,7 +471,7 @@ def within_ball(random: np.random.Generator, axes: np.ndarray) -> np.ndarray:
 
 def draw_outside(random: np.random.Generator, robot: Table, planar: bool, frame: Frame) -> Table:
     """Return external loads at their full size."""
-    moment, force = sizes_of(robot)
+    moment, force = sizes_of(robot, planar)
     size = float(np.exp(random.uniform(np.log(0.01), np.log(1.0)))) / len(frame.outside)
     flat = np.array([1.0, 0.0, 1.0]) if planar else np.ones(3)
     turn = np.array([0.0, 1.0, 0.0]) if planar else np.ones(3)
@@ -579,7 +589,7 @@ def tables_of(seed: int, number: int) -> tuple[Table, list[Table], str]:
     )
     robot["friction"] = draw_friction(of_form)
     robot["tendon"] = draw_tendons(of_form, robot, planar)
-    mix_others(mixed, robot, planar, tension_scale(robot, planar), sizes_of(robot)[1])
+    mix_others(mixed, robot, planar, tension_scale(robot, planar), sizes_of(robot, planar)[1])
     frame = draw_frame(of_form, len(robot["tendon"]))
     if number % VARIANTS:
         varied(random, robot)
