@@ -210,8 +210,8 @@ def draw_tendons(random: np.random.Generator, robot: Table, planar: bool) -> lis
         elif bodies not in ends_for(robot, direction) and random.random() < 0.97:
             tendon["end_body"] = ends_for(robot, direction)[-1]
         if random.random() < 0.3:
-            elastic = tension_scale(robot, planar) * between_decades(random, 10, 1e5)
-            tendon["axial_stiffness"] = elastic
+            strong = tension_scale(robot | {"tendon": [*tendons, tendon]}, planar)
+            tendon["axial_stiffness"] = strong * between_decades(random, 10, 1e5)
             tendon["free_length"] = radius * random.uniform(0, 20)
         tendons.append(tendon)
     return tendons
