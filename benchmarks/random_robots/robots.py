@@ -472,7 +472,7 @@ def within_ball(random: np.random.Generator, axes: np.ndarray) -> np.ndarray:
 def draw_outside(random: np.random.Generator, robot: Table, planar: bool, frame: Frame) -> Table:
     """Return external loads at their full size."""
     moment, force = sizes_of(robot, planar)
-    size = float(np.exp(random.uniform(np.log(0.01), np.log(1.0)))) / len(frame.outside)
+    size = between_decades(random, 0.05, 1.0) / len(frame.outside)
     flat = np.array([1.0, 0.0, 1.0]) if planar else np.ones(3)
     turn = np.array([0.0, 1.0, 0.0]) if planar else np.ones(3)
     radius = robot["tube"]["outer_diameter"] / 2
@@ -532,7 +532,7 @@ def draw_history(
 ) -> list[Table]:
     """Return the loads, step by step."""
     steps, tendons = frame.steps, len(robot["tendon"])
-    size = float(np.exp(random.uniform(np.log(1e-3), np.log(3.0))))
+    size = between_decades(random, 0.02, 3.0)
     if random.random() < 0.04:
         size *= float(10 ** random.uniform(2, 6))
     most = most_tension(robot, planar)
