@@ -17,6 +17,8 @@ Table = dict[str, Any]
 _MOST_GAPS = 12
 # A table ends beyond the angle at which it closes, mostly: beyond its ends nothing is computed.
 _CLOSES = 0.9
+# Half a turn, deg: the free backbone of a row of gaps does not meet itself.
+_FREE_BEND = 180.0
 
 
 def mix_notches(
@@ -68,6 +70,10 @@ def mix_notches(
         if random.random() < 0.3:
             gap = _gap(random, robot, planar, usual * _decades(random, 0.5, 30.0), material)
             notches.append(gap)
+    for notch in notches:
+        if notch["kind"] == "rod" and "precurvature_deg" in notch:
+            most = _FREE_BEND / notch["repeat"]
+            notch["precurvature_deg"] = float(np.clip(notch["precurvature_deg"], -most, most))
     if random.random() < 0.35:
         _own_parts(random, robot, material)
 
@@ -207,8 +213,18 @@ def _own_parts(random: np.random.Generator, robot: Table, material: Callable[[],
             notch["material"] = dict(own)
 
 
-def mix_others(random: np.random.Generator, robot: Table, planar: bool, tension: float) -> None:
-    """Give a robot with tendons holes in its disks, sheaths, a spool, a temperature and a line."""
+def mix_others(
+    random: np.random.Generator, robot: Table, planar: bool, tension: float, force: float
+) -> None:
+    """Give a robot with tendons holes in its disks, sheaths, a spool, a temperature and a line.
+
+    Args:
+        random: Where numbers are from.
+        robot: The robot; changed.
+        planar: Whether it stays in a plane.
+        tension: A tension that bends it far, N.
+        force: A force on its tip that does, N.
+    """
     _holes(random, robot, planar)
     outer, elastic = robot["tube"]["outer_diameter"], tension * _decades(random, 10.0, 1e5)
     if random.random() < 0.4:
@@ -216,7 +232,8 @@ def mix_others(random: np.random.Generator, robot: Table, planar: bool, tension:
         for tendon in robot["tendon"]:
             if every or random.random() < 0.5:
                 tendon |= _sheath(random, outer, elastic)
-    if len(robot["tendon"]) > 1 and random.random() < 0.4:
+    # The pretension of a spool has a least value, 1e-6 N, of a robot made smaller too.
+    if len(robot["tendon"]) > 1 and tension > 0.25 and random.random() < 0.4:
         for tendon in robot["tendon"][:2]:
             if "sheath_length" not in tendon:
                 tendon.setdefault("axial_stiffness", elastic)
@@ -231,7 +248,7 @@ def mix_others(random: np.random.Generator, robot: Table, planar: bool, tension:
             part["material"] |= _temperature(random, part["material"])
     for notch in robot["notch"]:
         if notch["kind"] == "rod" and random.random() < 0.4 and robot["material"].get("density"):
-            weight = 0.3 * tension / len(robot["notch"]) / notch["repeat"]
+            weight = force / len(robot["notch"]) / notch["repeat"]
             notch["disk_mass"] = weight / 9.81e-3 * _decades(random, 0.01, 1.0)
     if random.random() < 0.5:
         robot["fatigue"] = _line(random, outer)
@@ -332,8 +349,9 @@ def mix_loads(
     steps = len(loads)
     warms, bends, turns = form.random(3)
     material = robot["material"]
+    of_tube = [notch["kind"] != "table" and "material" not in notch for notch in robot["notch"]]
     own = any("material" in notch for notch in robot["notch"])
-    if "reference_temperature" in material and not own and warms < 0.7:
+    if "reference_temperature" in material and any(of_tube) and not own and warms < 0.7:
         course = random.uniform(-20.0, 60.0, steps)
         held = int(random.integers(0, steps))
         course[held:] = course[held]

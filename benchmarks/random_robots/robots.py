@@ -6,6 +6,14 @@ papers; the others are what a drawing of the tube gives: elastic ends, elastic c
 with and without hysteresis, a table of stress over strain. Into these other parts are mixed
 (parts.py). Tables have the keys of robot files; lengths in mm, forces in N, angles of robots in
 degrees. Some draws are no robots and are refused.
+
+Loads go up to the range of the model. A notch that closes bears any tension in its plane: these go
+up to three times what closes half of the notches, and now and then far beyond. Nothing stops gaps,
+tables, and out of the plane a notch that is bent to its side. There tendons together pull no more
+than what bends the softest gap or table to its range, or three times what closes the softest notch;
+they press on no gap so that it buckles; and they draw no more than such tensions do. All loads from
+outside together have at most the moment that closes the softest notch, bends the softest gap or
+table to its range, or twists an arc notch by half a radian.
 """
 
 from __future__ import annotations
@@ -34,6 +42,12 @@ NOTCHES = {
     "table": nf.TableNotch,
 }
 ROUND = {"arc", "rod", "table"}  # kinds over which a tendon may lie on any side
+# How many times what closes the softest notch may pull, where it may bend to its side; and what all
+# tendons together may press on a gap, times its length over its stiffness: hinged at both ends it
+# would buckle at pi**2, and bends to its side before.
+_SIDEWAYS, _UPRIGHT = 3.0, 3.0
+# How far loads from outside may twist an arc notch, rad.
+_TWISTED = 0.5
 STIFF = (
     "elastic_modulus",
     "superelastic_modulus",
@@ -196,7 +210,8 @@ def draw_tendons(random: np.random.Generator, robot: Table, planar: bool) -> lis
         elif bodies not in ends_for(robot, direction) and random.random() < 0.97:
             tendon["end_body"] = ends_for(robot, direction)[-1]
         if random.random() < 0.3:
-            tendon["axial_stiffness"] = tension_scale(robot) * between_decades(random, 10, 1e5)
+            strong = tension_scale(robot | {"tendon": [*tendons, tendon]}, planar)
+            tendon["axial_stiffness"] = strong * between_decades(random, 10, 1e5)
             tendon["free_length"] = radius * random.uniform(0, 20)
         tendons.append(tendon)
     return tendons
@@ -279,10 +294,40 @@ def draw_friction(random: np.random.Generator) -> Table:
     return {"kind": kind, "coefficient": coefficient, "turning": pick(random, slope=3, chord=1)}
 
 
-def tension_scale(robot: Table) -> float:
+def tension_scale(robot: Table, planar: bool) -> float:
     """Return a tension that bends the robot far [N]."""
     sizes = [reference(robot, notch) for notch in robot["notch"]]
-    return float(np.median([stiff * angle / lever for stiff, angle, lever in sizes]))
+    median = float(np.median([stiff * angle / lever for stiff, angle, lever in sizes]))
+    return min(median, most_tension(robot, planar))
+
+
+def most_tension(robot: Table, planar: bool) -> float:
+    """Return what every tendon may pull [N] where nothing stops what they bend."""
+    sides = np.radians([tendon["direction_deg"] for tendon in robot["tendon"]])
+    # How many pull toward one side, at most; by the cosine beside it.
+    together = np.maximum(np.cos(np.subtract.outer(sides, sides)), 0.0).sum(0).max()
+    most = []
+    for notch in robot["notch"]:
+        stiff, angle, lever = reference(robot, notch)
+        times = 1.0 if notch["kind"] in ("rod", "table") else math.inf if planar else _SIDEWAYS
+        most.append(times * stiff * angle / lever / together)
+        if notch["kind"] in ("rod", "table"):
+            most.append(_UPRIGHT * stiff / notch["length"] / len(sides))
+    return float(min(most))
+
+
+def most_stroke(robot: Table, tension: float, tendon: Table) -> float:
+    """Return what a tendon is drawn [mm] where all that it passes closes or bears a tension.
+
+    Friction takes of the tension on the way.
+    """
+    rows = [reference(robot, notch) for notch in robot["notch"] for _ in range(notch["repeat"])]
+    stroke, coefficient = 0.0, robot["friction"].get("coefficient", 0.0)
+    for stiff, angle, lever in rows[: tendon.get("end_body")]:
+        bend = min(angle, tension * lever / stiff)
+        stroke += lever * bend
+        tension *= math.exp(-coefficient * bend)
+    return stroke
 
 
 def varied(random: np.random.Generator, robot: Table) -> None:
@@ -326,7 +371,9 @@ def reference(robot: Table, notch: Table) -> tuple[float, float, float]:
             angle, known = 0.4, notch["stiffness"]
             stiffness = known[7 if len(known) == 36 else 1]
         angle = min(angle, math.radians(notch.get("closing_angle_deg", 60.0)))
-        return stiffness, 0.7 * angle, outer * 0.8 + max(notch.get("axis_offset", 0.0), 0.0)
+        lever = outer * 0.8 + max(notch.get("axis_offset", 0.0), 0.0)
+        # A tendon has no length left where the edges of its channel meet.
+        return stiffness, 0.7 * min(angle, notch["length"] / lever), lever
     if notch["kind"] == "rod":
         fibre, length = notch["diameter"] / 2, notch["length"]
         second = math.pi / 4 * (fibre**4 - (notch.get("inner_diameter", 0.0) / 2) ** 4)
@@ -373,17 +420,24 @@ def draw_course(random: np.random.Generator, steps: int, both_signs: bool) -> np
     return course
 
 
-def sizes_of(robot: Table) -> tuple[float, float, float, float]:
-    """Return stroke (mm), moment (N mm), force (N) and length (mm) that are large for a robot."""
-    rows = [(*reference(robot, notch), notch["repeat"]) for notch in robot["notch"]]
-    stroke = sum(angle * lever * count for _, angle, lever, count in rows)
-    moment = min(stiff * angle for stiff, angle, _, _ in rows)
+def sizes_of(robot: Table, planar: bool) -> tuple[float, float]:
+    """Return moment (N mm) and force (N) that are large for a robot."""
+    rows = [reference(robot, notch) for notch in robot["notch"]]
+    moments = [stiff * angle for stiff, angle, _ in rows]
+    for notch in robot["notch"]:
+        if notch["kind"] == "arc" and not planar:  # open sections twist before they bend
+            tube, material = (notch.get(key, robot[key]) for key in ("tube", "material"))
+            radii = tube["outer_diameter"] / 2, tube["inner_diameter"] / 2
+            left = section_of(notch["cut"], *radii, notch["depth"])
+            shear = elastic_modulus(material) / (2.0 + 2.0 * material.get("poisson_ratio", 0.3))
+            moments.append(_TWISTED * shear * left.torsion / notch["height"])
+    moment = min(moments)
     length = robot["tube"]["base_length"] + robot["tube"]["outer_diameter"] * 0.5
     for notch in robot["notch"]:
         piece = notch.get("length", notch.get("height", 2 * notch.get("slot_radius", 0.0)))
         piece += notch["uncut_length"]
         length += notch["repeat"] * (piece + notch.get("strip_thickness", 0.0))
-    return stroke, moment, moment / length, length
+    return moment, moment / length
 
 
 @dataclass(frozen=True)
@@ -409,10 +463,16 @@ def draw_frame(random: np.random.Generator, tendons: int) -> Frame:
     return Frame(steps, (first, *map(str, others)), tuple(map(str, outside)), following)
 
 
+def within_ball(random: np.random.Generator, axes: np.ndarray) -> np.ndarray:
+    """Return a random vector, along some of the axes, that is not longer than 1."""
+    vector = axes * random.normal(size=3)
+    return vector / max(1.0, float(np.linalg.norm(vector)))
+
+
 def draw_outside(random: np.random.Generator, robot: Table, planar: bool, frame: Frame) -> Table:
     """Return external loads at their full size."""
-    _, moment, force, _ = sizes_of(robot)
-    size = float(np.exp(random.uniform(np.log(0.01), np.log(1.0))))
+    moment, force = sizes_of(robot, planar)
+    size = between_decades(random, 0.05, 1.0) / len(frame.outside)
     flat = np.array([1.0, 0.0, 1.0]) if planar else np.ones(3)
     turn = np.array([0.0, 1.0, 0.0]) if planar else np.ones(3)
     radius = robot["tube"]["outer_diameter"] / 2
@@ -420,43 +480,42 @@ def draw_outside(random: np.random.Generator, robot: Table, planar: bool, frame:
     load: Table = {}
     for what in frame.outside:
         if what == "tip_force":
-            load["tip_force"] = size * force * flat * random.normal(size=3)
+            load["tip_force"] = size * force * within_ball(random, flat)
             if random.random() < 0.3:
                 load["tip_point"] = flat * random.uniform(-1, 1, 3) * radius
         elif what == "tip_moment":
-            load["tip_moment"] = size * moment * turn * random.normal(size=3)
+            load["tip_moment"] = size * moment * within_ball(random, turn)
         elif what == "tip_mass":
             load["tip_mass"] = size * force * 100
         elif what == "gravity":
-            load["gravity"] = 9.81 * flat * random.normal(size=3)
+            load["gravity"] = 9.81 * within_ball(random, flat)
         elif what == "base_rotation":
             load["base_rotation"] = turn * random.uniform(-1, 1, 3) * 3.0
         else:
+            count = 1 + frame.steps % 2
             load["body_forces"] = [
                 {
                     "body": int(random.integers(0, bodies + 1)),
-                    "force": size * force * flat * random.normal(size=3),
-                    "moment": size * moment * 0.5 * turn * random.normal(size=3),
+                    "force": size * force * 0.5 / count * within_ball(random, flat),
+                    "moment": size * moment * 0.5 / count * within_ball(random, turn),
                     "point": flat * random.uniform(-1, 1, 3) * radius,
                     "following": frame.following,
                 }
-                for _ in range(1 + frame.steps % 2)
+                for _ in range(count)
             ]
     heavy = robot["material"].get("density") is not None or "tip_mass" in load
-    if "gravity" in load and not heavy and random.random() < 0.9:
+    if "gravity" in load and not heavy:
         del load["gravity"]  # nothing to act on, which is refused
     load["following"] = frame.following
     return load
 
 
 def scaled(load: Table, factor: float) -> Table:
-    """Return external loads with forces, moments and masses times a factor."""
+    """Return external loads with forces and moments times a factor; a mass stays."""
     load = dict(load)
     for key in ("tip_force", "tip_moment"):
         if key in load:
             load[key] = load[key] * factor
-    if "tip_mass" in load:
-        load["tip_mass"] = load["tip_mass"] * abs(factor)
     if "body_forces" in load:
         load["body_forces"] = [
             part | {"force": part["force"] * factor, "moment": part["moment"] * factor}
@@ -469,18 +528,14 @@ def draw_history(
     random: np.random.Generator,
     robot: Table,
     planar: bool,
-    tension: float,
     frame: Frame,
 ) -> list[Table]:
     """Return the loads, step by step."""
-    steps = frame.steps
-    size = float(np.exp(random.uniform(np.log(1e-3), np.log(3.0))))
+    steps, tendons = frame.steps, len(robot["tendon"])
+    size = between_decades(random, 0.02, 3.0)
     if random.random() < 0.04:
         size *= float(10 ** random.uniform(2, 6))
-    if any(notch["kind"] in ("rod", "table") for notch in robot["notch"]):
-        size = min(size, 1.0)  # nothing stops a backbone, and a table ends
-    stroke = sizes_of(robot)[0]
-    tendons = len(robot["tendon"])
+    most = most_tension(robot, planar)
     told: Table = {
         "tension": np.full((steps, tendons), np.nan),
         "stroke": np.full((steps, tendons), np.nan),
@@ -489,13 +544,12 @@ def draw_history(
         if kind == "slack":
             continue
         course = draw_course(random, steps, both_signs=kind == "stroke" and tendon > 0)
-        unit = {"tension": tension, "stroke": min(size, 0.9) * stroke / size}
-        if kind == "both":
-            change = int(random.integers(1, steps))
-            told["tension"][:change, tendon] = size * tension * course[:change]
-            told["stroke"][change:, tendon] = size * unit["stroke"] * course[change:]
-        else:
-            told[kind][:, tendon] = size * unit[kind] * course
+        pulled = np.minimum(size * tension_scale(robot, planar) * course, most)
+        longest = 0.9 * most_stroke(robot, most, robot["tendon"][tendon])
+        drawn = min(size, 1.0) * longest * np.clip(course, -1.0, 1.0)
+        change = int(random.integers(1, steps)) if kind == "both" else steps * (kind == "tension")
+        told["tension"][:change, tendon] = pulled[:change]
+        told["stroke"][change:, tendon] = drawn[change:]
     # two strokes that work against each other agree, mostly: nothing stretches where they do not
     both = tendons > 1 and not np.isnan(told["stroke"][:, :2]).any()
     if both and random.random() < 0.85:
@@ -505,6 +559,7 @@ def draw_history(
         outside = draw_outside(random, robot, planar, frame)
     changes = random.random() < 0.5
     course = draw_course(random, steps, both_signs=True) if changes else np.ones(steps)
+    course = np.clip(course, -1.0, 1.0)
     return [
         {key: [None if np.isnan(x) else float(x) for x in told[key][step]] for key in told}
         | scaled(outside, float(course[step]))
@@ -534,7 +589,7 @@ def tables_of(seed: int, number: int) -> tuple[Table, list[Table], str]:
     )
     robot["friction"] = draw_friction(of_form)
     robot["tendon"] = draw_tendons(of_form, robot, planar)
-    mix_others(mixed, robot, planar, tension_scale(robot))
+    mix_others(mixed, robot, planar, tension_scale(robot, planar), sizes_of(robot, planar)[1])
     frame = draw_frame(of_form, len(robot["tendon"]))
     if number % VARIANTS:
         varied(random, robot)
@@ -542,8 +597,10 @@ def tables_of(seed: int, number: int) -> tuple[Table, list[Table], str]:
     form = f"{kinds} {'planar' if planar else 'spatial'} {robot['material']['kind']}"
     form += " elastic ends" if from_drawing else ""
     form += "".join(f" {word}" for word in mixed_words(robot))
-    history = draw_history(random, robot, planar, tension_scale(robot), frame)
-    mix_loads(mixed, random, robot, history, sizes_of(robot)[0])
+    history = draw_history(random, robot, planar, frame)
+    most = most_tension(robot, planar)
+    stroke = min(most_stroke(robot, most, tendon) for tendon in robot["tendon"][:2])
+    mix_loads(mixed, random, robot, history, stroke)
     return robot, history, form
 
 

@@ -4,6 +4,8 @@ Along a sheath ln T is a line of straight pieces between 0 (drive) and 1 (base).
 loses c = mu Theta over its length, in the direction in which it slides; where it sticks, T stays.
 So the tension of the drive holds the line between two others that fall and rise by c from it, and
 that of the base does the same from the other end. What was remembered before is read and judged.
+With less bend it slides where the line is steeper than c now holds, from the drive on: behind such
+a piece the slope of c goes on until it meets the old line, beyond which nothing moves.
 
 Base and drive are one contact: either the wire sticks somewhere, and what is drawn out at the base
 is taken up by the stretch from there to the base; or it slides all along, and the tensions at its
@@ -61,10 +63,19 @@ class Line(NamedTuple):
         return Line(place, level)
 
     def no_steeper(self, limit: float) -> Line:
-        """Let it slide from the drive on until it is nowhere steeper."""
-        most = limit * np.diff(self.place)
-        steps = np.clip(np.diff(self.level), -most, most)
-        return Line(self.place, self.level[0] + np.append(0.0, np.cumsum(steps)))
+        """Follow it from the drive on by no steeper slope, which goes on until it is met again."""
+        place, level = [self.place[0]], [self.level[0]]
+        for end, old, new in zip(self.place[1:], self.level, self.level[1:], strict=False):
+            width, gap = end - place[-1], old - level[-1]
+            nearer = limit * width - np.copysign(new - old, (new - old) * gap)
+            if 0.0 < abs(gap) < nearer:
+                part = abs(gap) / nearer
+                level.append(level[-1] + part * np.copysign(limit * width, gap))
+                place.append(place[-1] + part * width)
+            most = limit * (end - place[-1])
+            level.append(level[-1] + np.clip(new - level[-1], -most, most))
+            place.append(end)
+        return Line(np.array(place), np.array(level))
 
 
 def _memories(path: nf.EquilibriumPath) -> tuple[Any, Any] | None:

@@ -64,7 +64,10 @@ def test_wires_in_sheaths_are_judged_by_the_figures_of_a_steel_wire(robustness, 
     front = np.log(5.0 / 3.5) / (2.0 * limit)
     margin.within("front", partly.at(front) - np.log(5.0) + limit * front, 1e-14)
     steep = line_of(np.array([0.0, 0.5, 1.0]), np.array([0.0, 1.0, 1.1])).no_steeper(limit)
-    margin.within("slides", steep.level - [0.0, 0.5 * limit, 0.5 * limit + 0.1], 1e-15)
+    margin.within("slides", steep.level - [0.0, 0.5 * limit, limit], 1e-15)
+    met = line_of(np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.3, 0.2])).no_steeper(limit)
+    front = (0.3 + 0.5 * 0.2) / (limit + 0.2)  # where the slope that holds meets the old line
+    margin.within("beyond", met.at([front, 1.0]) - [limit * front, 0.2], 1e-15)
 
 
 @pytest.mark.nightly

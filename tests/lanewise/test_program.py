@@ -206,6 +206,24 @@ def test_rows_of_their_own_and_what_all_share():
     assert none.shape == (0, 10)
 
 
+@pytest.mark.parametrize("size", SIZES)
+def test_a_loop_over_what_all_rows_share(size):
+    """The entries of a step are the same in all rows, and meet what differs in them."""
+
+    def function(shared, own):
+        def step(total, one):
+            return total + one[1] * own[0], (total * one, one[0] * own[:2], jnp.flip(one))
+
+        return jax.lax.scan(step, own[1], shared.reshape(size, 2))
+
+    shared, own = given(size)[: 2 * size], np.random.default_rng(0).normal(size=(11, 3))
+    made, _ = program(function, [shared, own[0]], (size,), (False, True))
+    wanted = jax.tree.leaves(jax.vmap(function, in_axes=(None, 0))(shared, own))
+    for found, want in zip(made([shared, own]), wanted, strict=True):
+        want = np.asarray(want).reshape(11, -1)
+        np.testing.assert_allclose(found, want, rtol=ROUNDING, atol=ROUNDING)
+
+
 def primitive(name, function):
     """JAX's primitive of that name; where this JAX is too old, one that computes the same."""
     if hasattr(jax.lax, f"{name}_p"):

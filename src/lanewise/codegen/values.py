@@ -88,7 +88,9 @@ class Values:
         kind, storage = self.graph.kind[node], self.storage
         source = storage.buffer_address(buffer, first, stride)
         if length == 1:
-            self.name[node] = storage.load(source, 0, kind)
+            value = storage.load(source, 0, kind)
+            shared = self.is_vector(node) and not source.batched  # by all rows of a batch
+            self.name[node] = self.builder.splat(value, kind) if shared else value
             return
         alias = storage.alias(node)
         if self.schedule.is_looped(node):
