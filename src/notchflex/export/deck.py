@@ -176,13 +176,14 @@ def deck(
     held += [f"{node},1,3" for point, node in number.items() if not point.ties]
     held += [f"{node},2,2" for point, node in number.items() if point.ties and is_half]
     comments = (f"** {line}" for line in comment.splitlines())
+    elements = np.column_stack([1 + np.arange(len(mesh.elements)), mesh.elements])
     # The tension of the springs grows with the temperature, from 0 to 1; nothing else does.
     text = f"""{_lines(comments)}
 *NODE,NSET=NALL
 {_rows(mesh.place, 1)}
 {tendons}
 *ELEMENT,TYPE=C3D20R,ELSET=TUBE
-{_elements(mesh)}
+{_lines(_in_lines(row, 11) for row in elements.tolist())}
 {_sets(mesh, options)}
 *MATERIAL,NAME=TUBE
 {material_cards(robot.material)}
@@ -223,11 +224,6 @@ def _rows(rows: Iterable[Any], first: int | None = None) -> str:
     if first is None:
         return _lines(texts)
     return _lines(f"{number},{text}" for number, text in enumerate(texts, start=first))
-
-
-def _elements(mesh: TubeMesh) -> str:
-    numbered = np.column_stack([1 + np.arange(len(mesh.elements)), mesh.elements])
-    return _lines(_in_lines(row, 11) for row in numbered.tolist())
 
 
 def _in_lines(items: Iterable[Any], count: int, end: str = ",\n") -> str:

@@ -308,13 +308,6 @@ def _link(model: JointModel, body: int, position: Array) -> str:
     </link>"""
 
 
-def _has_mujoco() -> bool:
-    """Tell whether MuJoCo is installed, in a version whose springs yield."""
-    if importlib.util.find_spec("mujoco") is None:
-        return False
-    return int(import_module("mujoco").__version__.split(".")[0]) >= _FIRST_WITH_YIELD
-
-
 def run_mujoco(text: str, tendon: int, tension: Array, notches: int) -> tuple[Array, Array]:
     """Pull one tendon of an MJCF model through levels of tension, each until it stands still.
 
@@ -419,7 +412,8 @@ def mjcf_document(subject: Subject, options: SimulatorOptions) -> Document:
     facts: dict[str, Any] = {"largest_tension_N": model.top}
     numbers: dict[str, float] = {}
     warnings: list[str] = []
-    if _has_mujoco():
+    installed = importlib.util.find_spec("mujoco") is not None
+    if installed and int(import_module("mujoco").__version__.split(".")[0]) >= _FIRST_WITH_YIELD:
         facts["errors"] = measure_errors(model, mjcf(model))
         for error in facts["errors"]:
             tendon, total, area = error["tendon"], error["total_angle"], error["loop_area"]

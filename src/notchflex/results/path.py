@@ -227,7 +227,9 @@ def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
     last = f"; the last good state has tension {_load(path, step)} and stroke {stroke} mm"
     opening = np.asarray(path.chain.rods.length).sum(axis=-1)
     all_closed = (path.gap[step] < _CLOSED_TOLERANCE * opening).all()
-    if (all_closed or _past_closing(path, step)) and not np.isnan(path.load.stroke[step]).all():
+    drawn = path.load.stroke[step]
+    past_closing = np.asarray(path.chain.inextensible) & (drawn >= closing_stroke(path.chain))
+    if (all_closed or past_closing.any()) and not np.isnan(drawn).all():
         return _said(Failure.NOTCHES_CLOSED, last)
     if (slack := _slack_by_loss(path, step)) is not None:
         return _said(Failure.LOSS_LEAVES_SLACK, last, tendon=slack[0] + 1, loss=slack[1])
@@ -245,13 +247,6 @@ def why_not(path: EquilibriumPath, step: int) -> tuple[Failure | None, str]:
 
 def _said(failure: Failure, last: str = "", **values: object) -> tuple[Failure, str]:
     return failure, f"{failure.text.format(**values)}{last}; {failure.remedy}"
-
-
-def _past_closing(path: EquilibriumPath, step: int) -> bool:
-    """Return whether a stroke of a step exceeds the closing stroke of an inextensible tendon."""
-    reach = closing_stroke(path.chain)
-    inextensible = np.asarray(path.chain.inextensible)
-    return bool((inextensible & (path.load.stroke[step] >= reach)).any())
 
 
 def _edges_that_meet(path: EquilibriumPath, step: int) -> tuple[int, int] | None:

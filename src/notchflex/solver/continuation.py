@@ -82,13 +82,10 @@ class _Attempt(NamedTuple):
     regularisation: Float[Array, ""] | float = 0.0
     factor: Float[Array, ""] | float = 0.0
 
-    def after_plain(self, converged: Array) -> _Attempt:
-        """Return what is tried after the equations as they are."""
-        relaxed = self._replace(mode=_Mode.RELAXED, regularisation=_COMPLIANCE, factor=0.0)
-        return choose(converged, self._longer(), relaxed)
-
-    def after_relaxed(self, converged: Array, can_snap: bool) -> _Attempt:
-        """Return what is tried after a relaxed shape, or after the equations from the last one."""
+    def after_contacts(self, converged: Array, can_snap: bool) -> _Attempt:
+        """Return what is tried after the equations as they are, or after a relaxed shape."""
+        begun = self._replace(mode=_Mode.RELAXED, regularisation=_COMPLIANCE, factor=0.0)
+        plain = choose(converged, self._longer(), begun)
         # A compliance that fails is approached by the root of the factor, for tendons that are all
         # but slack (tests/solver/test_slight_tensions.py).
         compliance, root = self.regularisation, jnp.sqrt(self.factor)
@@ -101,11 +98,12 @@ class _Attempt(NamedTuple):
         further = self._replace(
             fraction=2.0 * self.fraction, regularisation=_COMPLIANCE, factor=jnp.zeros(())
         )
-        return choose(
+        relaxed = choose(
             converged,
             choose(compliance > 0.0, relaxed, further),
             choose(retries, larger, self._shorter(can_snap)),
         )
+        return choose(self.mode == _Mode.RELAXED, relaxed, plain)
 
     def after_snapping(self, converged: Array) -> _Attempt:
         """Return what is tried after a viscous shape, or after the equations from the last one."""
@@ -198,9 +196,7 @@ def solve_load_step(
         target = interpolate_command(chain, command, last, end)
         new = _solve_substep(chain, target, state, settings, end, can_snap)
         result = _result_after(chain, state, new, target, end)
-        relaxed = attempt.after_relaxed(new.converged, can_snap)
-        plain = attempt.after_plain(new.converged)
-        after = choose(attempt.mode == _Mode.RELAXED, relaxed, plain)
+        after = attempt.after_contacts(new.converged, can_snap)
         if can_snap:
             snapping = attempt.after_snapping(new.converged)
             after = choose(attempt.mode == _Mode.SNAPPING, snapping, after)
