@@ -226,7 +226,9 @@ def mix_others(
         force: A force on its tip that does, N.
     """
     _holes(random, robot, planar)
-    outer, elastic = robot["tube"]["outer_diameter"], tension * _decades(random, 10.0, 1e5)
+    # Wires are stretched by a three-thousandth at least: of a stiffer one in a sheath, drawn by a
+    # stroke, rounding decides the tension.
+    outer, elastic = robot["tube"]["outer_diameter"], tension * _decades(random, 10.0, 3e3)
     if random.random() < 0.4:
         every = random.random() < 0.6
         for tendon in robot["tendon"]:
