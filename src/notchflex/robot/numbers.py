@@ -7,7 +7,7 @@ import functools
 import itertools
 import math
 import operator
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -52,9 +52,13 @@ class PartsForm:
             content.append((type(part).__name__, words))
         return cls(repr((content, places)), (*parts,), places)
 
+    @functools.cached_property  # for each robot of a batch
+    def _getters(self) -> list[tuple[int, Callable[[Any], Any]]]:
+        return [(number, operator.attrgetter(key)) for number, key in self.places]
+
     def numbers_of(self, parts: Sequence[Any]) -> Float[np.ndarray, " numbers"]:
         """Return the numbers of parts of this form."""
-        return np.array([operator.attrgetter(key)(parts[number]) for number, key in self.places])
+        return np.array([number_of(parts[place]) for place, number_of in self._getters])
 
     def with_numbers(self, numbers: Any) -> tuple[Any, ...]:
         """Return parts with other numbers, which nothing checks: plain or traced ones."""

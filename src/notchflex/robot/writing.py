@@ -102,9 +102,14 @@ def _fresh(robot: Robot) -> str:
     for named in named_parts(robot):
         if named.section == "drawing" and "tolerance" in table:
             lines += ["", "[tolerance]", *_tolerance_lines(table["tolerance"])]
-        if named.section in table:
-            header = f"[[{named.section}]]" if named.first else f"[{named.section}]"
-            lines += ["", header, *_fresh_part(named.part)]
+        if named.section not in table:
+            continue
+        lines += ["", f"[[{named.section}]]" if named.first else f"[{named.section}]"]
+        fields = fields_of(type(named.part))
+        for key, value in plain(named.part).items():
+            comment = ", ".join(filter(None, (unit_of(fields[key]), fields[key].description)))
+            line = f"{key} = {_written(value)}"
+            lines.append(f"{line}  # {comment}" if comment else line)
     return "\n".join(lines) + "\n"
 
 
@@ -121,16 +126,6 @@ def _written(value: Any) -> str:
         item = tomlkit.inline_table()
         item.update(value)
     return item.as_string()
-
-
-def _fresh_part(part: Any) -> list[str]:
-    lines: list[str] = []
-    fields = fields_of(type(part))
-    for key, value in plain(part).items():
-        comment = ", ".join(filter(None, (unit_of(fields[key]), fields[key].description)))
-        line = f"{key} = {_written(value)}"
-        lines.append(f"{line}  # {comment}" if comment else line)
-    return lines
 
 
 @dataclass

@@ -95,9 +95,7 @@ class _Attempt(NamedTuple):
         retries = (compliance > 0.0) & (root > 0.0) & (root < _MAX_FACTOR)
         relaxed = self._replace(regularisation=smaller, factor=factor)
         # Where contacts were not found directly, those of the next substep would not be either.
-        further = self._replace(
-            fraction=2.0 * self.fraction, regularisation=_COMPLIANCE, factor=jnp.zeros(())
-        )
+        further = begun._replace(fraction=2.0 * self.fraction)
         relaxed = choose(
             converged,
             choose(compliance > 0.0, relaxed, further),
