@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-
 import numpy as np
 import pytest
 
 import notchflex as nf
 from reference_data import named_rows, reference
-from shared_data import measured_path
+from shared_data import measured, measured_path, numbers
 
 
 def _errors(rows: slice) -> np.ndarray:
@@ -145,11 +143,10 @@ def test_a_measured_robot_of_nine_tendons(part: str, most: float, friction: floa
     file = measured_path(f"ftdcr_v4_{part}.csv")
     if not file.is_file():
         pytest.skip("the measurements of FTDCR v4 are not beside this checkout")
-    with file.open(newline="", encoding="utf-8") as text:
-        rows = list(csv.DictReader(text))
-    strokes = [[float(row[key]) for key in row if key.startswith("servo")] for row in rows]
-    seen = np.array([[float(row[f"tip_{axis}"]) for axis in "xyz"] for row in rows])
-    path = nf.simulate(_nine_tendons(friction), nf.LoadPath(stroke=np.array(strokes) + 0.184))
+    rows = measured(file.name)
+    strokes = np.transpose([numbers(rows, key) for key in rows[0] if key.startswith("servo")])
+    seen = np.transpose([numbers(rows, f"tip_{axis}") for axis in "xyz"])
+    path = nf.simulate(_nine_tendons(friction), nf.LoadPath(stroke=strokes + 0.184))
     assert path.converged.all(), path[int(np.argmin(path.converged))].reason
     off = path.tip_position - seen
     assert np.sqrt(np.mean(np.sum((off - off.mean(axis=0)) ** 2, axis=1))) <= most
