@@ -57,7 +57,7 @@ def held_stiffness(
     long, chain = prepared.long, prepared.chain
     loads = prepared.packed_commands(commands)
     states = prepared.packed_states(np.asarray(prepared.state.pack(solved, leading=1)))
-    form = unit_rows(chain, by_stroke=commands.by_stroke is not None)
+    form = unit_rows(chain)
     modes = np.arange(chain.flexures)[:, None] * form.unknowns + np.arange(len(form.modes))
     unpadded = modes[np.asarray(chain.rods.padding_mask) == 0.0]
     for start in range(0, len(loads.numbers), _BATCH):
@@ -113,7 +113,7 @@ def _rows(chain: Chain, command: Command, solved: SolverState) -> tuple[Array, .
     if (last := solved.memory.sheath) is not None:
         side = bound_side(last.level[:, 0] - last.level[:, -1], last.limit)
         sheath = last._replace(stroke=last.stroke - _SLIP * side)
-    form = unit_rows(chain, by_stroke=command.by_stroke is not None)
+    form = unit_rows(chain)
     jacobians = StateJacobians(chain, unknowns, memory, solved.applied, evaluation, form)
     slopes = command_slopes(chain, aimed(chain, command, last), sheath, evaluation.base)
     return (*linearise(jacobians), jnp.stack(slopes))
@@ -140,10 +140,12 @@ def _assemble(
         operands = np.concatenate([unit[:, columns[number]], carried[-1]], axis=1)
         carried.append(np.asarray(rows.to_next)[:, number, :, : operands.shape[1]] @ operands)
     matrix, back = np.zeros((states, size, size)), np.zeros((states, form.beyond, size))
+    tension_length = np.zeros((states, len(chain.tendon_order), size))
     for number in reversed(range(flexures)):
         operands = np.concatenate([unit[:, columns[number]], carried[number], back], axis=1)
         matrix[:, columns[number]] = np.asarray(rows.residual)[:, number] @ operands
         back = np.asarray(rows.to_previous)[:, number] @ operands
+        tension_length += np.asarray(rows.tension_length)[:, number] @ operands
     first = np.arange(flexures)[:, None] * count
     modes = first + np.arange(len(form.modes))
     matrix[:, modes] *= np.asarray(chain.stiffness)[..., None]
@@ -151,14 +153,15 @@ def _assemble(
     natural_gap = np.asarray(chain.rods.length).sum(-1)
     compliance = 1.0 / (_HOLDING_STIFFNESS * np.asarray(chain.contact_stiffness) * natural_gap)
     matrix[:, contacts, contacts] += compliance[:, None]
-    by_tendon = back[:, form.beyond - 2 * len(order) :].reshape(states, 2, len(order), size)
-    lengths = np.moveaxis(by_tendon, 1, 0)[:, :, np.argsort(order)]
+    tension_length = tension_length[:, np.argsort(order)]
+    at_exit = back[:, form.beyond - len(order) :][:, np.argsort(order)]
+    released = at_exit - tension_length / np.asarray(chain.memory_stiffness)[:, None]
     if by_stroke is not None:
-        matrix[:, tensions] = slopes[:, 1] @ lengths[0] + slopes[:, 2] @ lengths[1]
+        matrix[:, tensions] = slopes[:, 1] @ released + slopes[:, 2] @ tension_length
         matrix[:, tensions[:, None], tensions] += slopes[:, 0]
         soft = by_stroke / (_HOLDING_STIFFNESS * np.asarray(chain.stroke_stiffness))
         matrix[:, tensions, tensions] += soft
-    return matrix, lengths[0][..., modes.ravel()]
+    return matrix, released[..., modes.ravel()]
 
 
 def stable(

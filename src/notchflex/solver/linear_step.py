@@ -56,7 +56,6 @@ class UnitRows(NamedTuple):
     transmitted: Any
     external: Any
     released_length: Any
-    tension_length: Any
 
     @property
     def unknowns(self) -> int:
@@ -70,7 +69,7 @@ class UnitRows(NamedTuple):
 
     @property
     def beyond(self) -> int:
-        """Number of columns that come from the tip: wrenches, loads, tendon lengths last."""
+        """Number of columns that come from the tip: wrenches, loads, released lengths last."""
         return _count(self[6:])
 
     @property
@@ -101,12 +100,10 @@ def _pad(rows: Array, columns: int) -> Array:
     return jnp.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, columns)])
 
 
-def unit_rows(chain: Chain, *, by_stroke: bool) -> UnitRows:
-    """Return the unit rows of a chain whose tendons have tensions alone, or some strokes."""
-    # A tendon passes its released length and its tension times length from the tip. Slip over a
-    # contact depends only on a sum of the two, which suffices where no stroke is commanded. Dead
-    # forces change with the rotation of the body in whose frame they are given; only their moment
-    # comes from the tip.
+def unit_rows(chain: Chain) -> UnitRows:
+    """Return the unit rows of a chain."""
+    # Dead forces change with the rotation of the body in whose frame they are given; only their
+    # moment comes from the tip.
     wrench = chain.rods.basis.shape[-2] if chain.forces_on_bodies else 0
     older = (wrench,) * (chain.window - 1 if wrench else 0)
     turn = (3 if wrench == 6 else 1) if chain.loaded else 0
@@ -121,7 +118,6 @@ def unit_rows(chain: Chain, *, by_stroke: bool) -> UnitRows:
         transmitted=older,
         external=wrench if turn and chain.follows else turn,
         released_length=tendons,
-        tension_length=tendons if by_stroke else (),
     )
     leaves, structure = jax.tree.flatten(sizes)
     ends = np.cumsum(leaves)
@@ -140,10 +136,9 @@ class TendonJacobian(NamedTuple):
         gap_tension: Of the tension in the gap.
         carried: Of the tension beyond the distal body.
         at_edges: Of the tendon slid over both edges.
-        released_length: Of the released length, this gap included; where no stroke is commanded,
-            of its sum with the stretch by the stiffness of the friction law.
-        tension_length: Of tension times length, this gap included; None where no stroke is
-            commanded.
+        released_length: Of the released length with the stretch by the stiffness of the friction
+            law, this gap included: slip over a contact depends on no other sum from the tip.
+        tension_length: Of tension times length, of this gap alone.
     """
 
     turning: Float[Array, "n t 2 short"]
@@ -153,7 +148,7 @@ class TendonJacobian(NamedTuple):
     carried: Float[Array, "n t z"]
     at_edges: Float[Array, "n t 2 z"]
     released_length: Float[Array, "n t z"]
-    tension_length: Float[Array, "n t z"] | None
+    tension_length: Float[Array, "n t z"]
 
 
 @dataclass
@@ -250,24 +245,16 @@ class StateJacobians:
         body_tension = runs * (ratio[:, :, 1] * gap_tension - in_body * log_ratio[None, :, 1])
         in_body = body_tension * group.body_length[..., None]
         stiffness = of_group(chain.memory_stiffness, group)[None, :, None]
-        own_tension_length = gap_tension * group.natural_gap[..., None] + in_body
+        tension_length = gap_tension * group.natural_gap[..., None] + in_body
         beyond = unit.released_length[k][None]
-        released_length = beyond - runs * unit.spread(length)
-        if not unit.tension_length:
-            tension_length = None
-            at_exit = released_length = released_length + own_tension_length / stiffness
-            at_entry = beyond + in_body / stiffness
-        else:
-            tension_length = unit.tension_length[k][None] + own_tension_length
-            at_exit = released_length + tension_length / stiffness
-            at_entry = beyond + (unit.tension_length[k][None] + in_body) / stiffness
+        released_length = beyond - runs * unit.spread(length) + tension_length / stiffness
         return TendonJacobian(
             turning=turning,
             wrench=wrench,
             log_ratio=log_ratio,
             gap_tension=gap_tension,
             carried=jnp.where(runs > 0.0, body_tension, tension),
-            at_edges=jnp.stack([at_exit, at_entry], axis=2),
+            at_edges=jnp.stack([released_length, beyond + in_body / stiffness], axis=2),
             released_length=released_length,
             tension_length=tension_length,
         )
@@ -395,7 +382,7 @@ class StateJacobians:
 # and from the tip side come
 #
 #     the wrenches of spans and contacts that end beyond; those of the external loads, or their
-#     moments alone; the released lengths of the tendons and their tension times length.
+#     moments alone; the released lengths of the tendons.
 #
 # JAX differentiates only the geometry of a span, a contact or a rod, each on its own.
 
@@ -411,11 +398,13 @@ class LinearisedRows(NamedTuple):
         residual: Of the residual.
         to_next: Of what is passed to the next flexure.
         to_previous: Of what is passed to the previous flexure.
+        tension_length: Of the tension times length of every tendon; no flexure depends on its sum.
     """
 
     residual: Float[Array, "n u z"]
     to_next: Float[Array, "n c z"]
     to_previous: Float[Array, "n b z"]
+    tension_length: Float[Array, "n t z"]
 
 
 def linearise(jacobians: StateJacobians) -> LinearisedRows:
@@ -429,12 +418,10 @@ def linearise(jacobians: StateJacobians) -> LinearisedRows:
     to_next += [jacobians.turn] if len(unit.turn) else []
     to_next += [tendon.carried for tendon in tendons]
     to_previous += [tendon.released_length for tendon in tendons]
-    lengths = (tendon.tension_length for tendon in tendons)
-    to_previous += [length for length in lengths if length is not None]
+    rows = (residual, to_next, to_previous, [tendon.tension_length for tendon in tendons])
     # Of an empty list, none.
     none = jnp.zeros((chain.flexures, 0, unit.modes.shape[-1]))
-    stacked = (jnp.concatenate([none, *rows], axis=1) for rows in (residual, to_next, to_previous))
-    return LinearisedRows(*stacked)
+    return LinearisedRows(*(jnp.concatenate([none, *of_parts], axis=1) for of_parts in rows))
 
 
 def _balance_rows(jacobians: StateJacobians) -> tuple[Float[Array, "n m z"], list[Array]]:
@@ -563,7 +550,7 @@ def linear_step(
     """Solve the linearised balance at a point for the step to equilibrium."""
     # Derivatives of the step are those of the residual, not those of the linear system: a step from
     # a solved state then changes as the solution does (implicit function theorem).
-    unit = unit_rows(chain, by_stroke=command.by_stroke is not None)
+    unit = unit_rows(chain)
     unknowns = point.unknowns
     state = (chain, unknowns, memory, command.applied, evaluation)
     rows = linearise(StateJacobians(*jax.tree.map(jax.lax.stop_gradient, state), unit=unit))
@@ -580,15 +567,19 @@ def linear_step(
     # What is carried to the first flexure per unit of base tension: the tension itself.
     order, at_base = chain.tendon_order, np.zeros((unit.carried, chain.tendons))
     at_base[unit.carried - len(order) + np.arange(len(order)), order] = 1.0
-    condensed, back = _condense(insert(rows.to_next), insert(rows.to_previous), unit)
+    by_stroke = command.by_stroke is not None
+    sums = rows.tension_length if by_stroke else rows.tension_length[:, :0]
+    condensed, back, total = _condense(*map(insert, (rows.to_next, rows.to_previous, sums)), unit)
     tension_step = command.target - point.base_tension
     if command.by_stroke is not None:
         slopes, count = command_slopes(chain, command, memory.sheath, evaluation.base), len(order)
-        by_tension = jnp.concatenate([back[:, :1], back[:, 1:] @ at_base], axis=1)
-        lengths = by_tension[len(back) - 2 * count :].reshape(2, count, -1)
-        # Rows in the order of the robot's tendons.
-        released, stretched = jnp.stack([lengths[:, row] for row in np.argsort(order)], axis=1)
-        by_base = slopes[1] @ released + slopes[2] @ stretched
+        # Rows in the order of the robot's tendons, over 1 and base tensions.
+        at_exit, tension_length = (
+            jnp.concatenate([rows[:, :1], rows[:, 1:] @ at_base], axis=1)[np.argsort(order)]
+            for rows in (back[len(back) - count :], total)
+        )
+        released = at_exit - tension_length / chain.memory_stiffness[:, None]
+        by_base = slopes[1] @ released + slopes[2] @ tension_length
         matrix = slopes[0] + by_base[:, 1:]
         # Where every contact sticks, the stroke does not depend on the tension; a small pivot keeps
         # the step finite.
@@ -610,25 +601,40 @@ def linear_step(
 
 
 def _condense(
-    to_next: Float[Array, "n c z"], to_previous: Float[Array, "n b z"], unit: UnitRows
-) -> tuple[tuple[Float[Array, "n c 1+c"], Float[Array, "n b 1+c"]], Float[Array, "b 1+c"]]:
+    to_next: Float[Array, "n c z"],
+    to_previous: Float[Array, "n b z"],
+    sums: Float[Array, "n k z"],
+    unit: UnitRows,
+) -> tuple[
+    tuple[Float[Array, "n c 1+c"], Float[Array, "n b 1+c"]],
+    Float[Array, "b 1+c"],
+    Float[Array, "k 1+c"],
+]:
     """Eliminate the couplings of neighbours from the tip: rows over (1, carried, from beyond)."""
     # Returns rows over (1, carried) of what every element carries to the next and receives from it,
-    # and of what the first hands to the base.
+    # of what the first hands to the base, and of sums over all elements.
     size = 1 + unit.carried
     identity = constant(np.eye(unit.carried))
 
-    def join(back: Array, item: tuple[Array, Array]) -> tuple[Array, tuple[Array, Array]]:
-        to_next, to_previous = item
+    def join(
+        beyond: tuple[Array, Array], item: tuple[Array, ...]
+    ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        (back, total), (to_next, to_previous, addends) = beyond, item
         by_back = to_next[:, size:]
         right = _add_constant(to_next[:, :size], by_back @ back[:, 0])
         carried_on = gauss_jordan(identity - by_back @ back[:, 1:], right)
-        returned = _add_constant(back[:, 1:] @ carried_on, back[:, 0])
-        return to_previous[:, :size] + to_previous[:, size:] @ returned, (carried_on, returned)
+        returned, total = (
+            _add_constant(rows[:, 1:] @ carried_on, rows[:, 0]) for rows in (back, total)
+        )
+        back = to_previous[:, :size] + to_previous[:, size:] @ returned
+        total = total + addends[:, :size] + addends[:, size:] @ returned
+        return (back, total), (carried_on, returned)
 
-    at_tip = jnp.zeros((unit.beyond, size))
-    back, condensed = jax.lax.scan(join, at_tip, (to_next, to_previous), reverse=True)
-    return condensed, back
+    at_tip = (jnp.zeros((unit.beyond, size)), jnp.zeros((sums.shape[1], size)))
+    (back, total), condensed = jax.lax.scan(
+        join, at_tip, (to_next, to_previous, sums), reverse=True
+    )
+    return condensed, back, total
 
 
 def _add_constant(rows: Float[Array, "k z"], by: Float[Array, " k"]) -> Float[Array, "k z"]:
