@@ -159,8 +159,8 @@ class NodeBuilder:
     def _simplify_select(self, args: tuple[int, ...], known: list[Any]) -> int | None:
         if known[0] is not None:
             return args[1] if known[0] else args[2]
-        if args[1] == args[2]:
-            return args[1]
+        if args[1] == args[2] or (known[1] is not None and known[1] == known[2]):
+            return args[1]  # signs of known zeros do not count
         if self.graph.kind[args[1]] == "b" and known[1] is not None and known[2] is not None:
             return args[0] if known[1] else self.make("not", args[:1])
         return None
