@@ -489,12 +489,6 @@ def _contact_rows(jacobians: StateJacobians) -> list[Array]:
     return rows
 
 
-# A contact that sticks leaves what its neighbours cannot hold to the next one alone, so that sliding
-# advances by one contact in a step. Far from the solution the slopes therefore let it slide by this
-# times the largest imbalance of log ratios; near it this vanishes as the square of the step.
-_SPREADING = 0.1
-
-
 def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     """Compute the rows of the friction law at both edges, for the k-th group."""
     chain, span, tendon = jacobians.chain, jacobians.evaluation.spans[k], jacobians.tendons[k]
@@ -518,10 +512,11 @@ def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
         rows = jnp.stack([before, tendon.gap_tension], axis=2)
         limit = limit + slope(still, still + 1.0)[..., None] * rows
     height = notch_heights(chain)[:, None, None, None]
-    residual = jacobians.evaluation.residual.log_ratio
-    imbalance = jnp.max(jnp.abs(ravel_pytree(residual)[0]), initial=0.0)
-    compliance = jacobians.memory.slip_per_log_ratio(chain, group)[..., None]
-    compliance = compliance + _SPREADING * imbalance
+    # A contact that sticks hands on all that its neighbours cannot hold, so that sliding advances by
+    # one contact in a step. Far from the solution it therefore yields in the slopes; as it yields by
+    # the square of the imbalance, convergence stays quadratic.
+    imbalance = jnp.max(jnp.abs(ravel_pytree(jacobians.evaluation.residual.log_ratio)[0]))
+    compliance = jacobians.memory.slip_per_log_ratio(chain, group)[..., None] + imbalance**2
     stuck = -AUGMENTATION * (tendon.at_edges / height - compliance * tendon.log_ratio[None])
     value, bound = trial_log_ratio(chain, log_ratio, span.slid, jacobians.memory, k), span.bound
     upper, lower = (value >= bound)[..., None], (value <= -bound)[..., None]
