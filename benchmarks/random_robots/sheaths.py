@@ -28,7 +28,7 @@ _EXACT = 1e-8  # relative, of tensions; of log ratios
 # The solver keeps 12 corners, and drops the one that changes the line least.
 _CORNERS, _DROPPED = 12, 1e-3
 _LENGTH = 1e-9  # mm, below which a wire has not moved
-_ROUNDING, _ROOT = 1e-10, 1e-6  # of strokes, over the lengths of a robot; and its root
+_ROOT = 1e-6  # of the rounding of strokes
 _STROKE = 1e-6  # of all strokes and stretches, and of the height of all notches
 
 
@@ -160,9 +160,7 @@ def _judged(state: State, before: Any, after: Any, number: int) -> Iterator[str]
     # Of the way of a stuck wire: what its end is drawn out, and what it stretches from there.
     stretch = soft * (old.between(*from_base).mean() - old.mean())
     slip = float(state.drawn[number] - before.stroke[number]) + stretch
-    # Of a drive by stroke the tension follows from a stretch, which is small in a stiff wire.
-    told_by = _ROUNDING * (state.reach + state.height) / max(soft * largest, 1e-300)
-    slides = abs(falls - np.copysign(limit, slip)) <= exact + told_by * (not by_tension)
+    slides = abs(falls - np.copysign(limit, slip)) <= _EXACT
     if np.isinf(tendon.axial_stiffness):
         # The solver lets an inextensible tendon give way a little, so that its tension is known.
         change = base - np.exp(remembered.level[-1])

@@ -61,3 +61,35 @@ def test_it_is_the_dense_step(case: str, margin) -> None:
     dense = np.linalg.solve(matrix, -left)
     step = jax.jit(condensed)(at)
     margin.within("relative", (step - dense) / np.abs(dense).max(), 1e-8)
+
+
+def stuck_step(size: float) -> Iterate:
+    """Return the step from a bent shape where contacts stick, in forces of a robot of size 1."""
+    robot = nf.Robot(
+        name="of a size",
+        tube=nf.Tube(1.6 * size, 1.4 * size),
+        notch=(nf.ArcNotch("on-axis", 1.4 * size, 0.8 * size, uncut_length=1.2 * size, repeat=3),),
+        tendon=(nf.Tendon(0.7 * size),),
+        material=nf.Linear(50_000.0),
+        friction=nf.Corner(0.3),
+    )
+    path = load_path(nf.Load(stroke=size), 1)
+    ready = prepare_for(robot, path)
+    wanted = jax.tree.map(lambda leaf: leaf[0], make_commands(path, robot, ready.chain))
+    unknowns = ready.rest.point.unknowns
+    unknowns = unknowns._replace(modes=unknowns.modes + 0.1)
+    at = Iterate(unknowns, 0.0 * ready.rest.point.base_tension + size**2)
+    found = evaluate(ready.chain, at, ready.rest.memory, wanted.applied)
+    memory = ready.rest.memory._replace(slid=tuple(span.slid for span in found.spans))
+    found = evaluate(ready.chain, at, memory, wanted.applied)
+    assert np.all(found.spans[0].bound[:-1] > 0.0), "none sticks"
+    step = linear_step(ready.chain, wanted, at, memory, found)
+    return step._replace(base_tension=step.base_tension / size**2)
+
+
+@pytest.mark.filterwarnings("ignore::notchflex.InputWarning")  # 160 mm wide
+def test_of_a_robot_of_another_size_it_is_as_large(margin) -> None:
+    """Where every contact sticks a stroke does not tell the tension: a pivot does."""
+    one, other = (stuck_step(size) for size in (1.0, 100.0))
+    margin.within("tension", other.base_tension / one.base_tension - 1.0, 1e-6)
+    margin.within("bending", other.unknowns.modes - one.unknowns.modes, 1e-6, "rad")

@@ -7,6 +7,7 @@ every place on a fine grid. `sheath_chain.py` is a chain of contacts with elasti
 
 from __future__ import annotations
 
+import dataclasses
 from itertools import pairwise
 
 import numpy as np
@@ -106,6 +107,27 @@ def test_strokes_return_the_tensions(name, margin):
     margin.within(f"{name}: base", difference, FIGURE, "N")
     # A front that has only begun is stiff in the tension: the stroke falls with its square.
     margin.within(f"{name}: drive", by_stroke.tension - by_tension.tension, FIGURE, "N")
+
+
+def test_a_stiff_wire_that_slides_all_along_holds_the_tension_of_the_drive(margin):
+    """Near there the stroke changes with its square: rounding of strokes would tell its root."""
+    ways = [0.2, 0.4, 0.6, 0.8, 1.0, 0.7, 0.5, 0.3]
+    path = follow(sheathed(sheath_wire_stiffness=1e9), strokes(ways))
+    fall = np.log(path.tension / path.base_tension)[:, 0]
+    margin.within("friction", fall - LIMIT * np.sign(np.diff(ways, prepend=0.0)), 1e-13)
+
+
+def test_a_tendon_beside_one_in_a_sheath_has_the_same_derivatives(margin):
+    """Its drive has the tension of its base, and the slopes of that."""
+    plain = ready("a").tendon[0]
+    opposite = dataclasses.replace(plain, direction_deg=plain.direction_deg + 180.0)
+    pair = ready("a").replace(tendon=(plain, opposite))
+    beside = sheathed(pair).replace(tendon=(plain, sheathed(pair).tendon[1]))
+    loads = [nf.Load(stroke=(stroke, None), tension=(None, 0.2)) for stroke in (0.5, 0.6)]
+    slopes = follow(beside, loads).jacobian(("notch.depth",), ("tension", "base_tension"))
+    at_drive, at_base = (slopes[name][:, 0] for name in ("tension", "base_tension"))
+    assert np.abs(at_base).min() > 1.0
+    margin.within("by depth", at_drive - at_base, 1e-12, "N/mm")
 
 
 def test_more_reversals_than_corners_forget_the_least(margin):

@@ -540,8 +540,10 @@ def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
 # tensions at the base are unknown; substitution then goes from the base to the tip. This is the
 # elimination of a block-tridiagonal matrix, in two loops: the program does not grow with the chain.
 
-# Slopes of a stroke below the second count as zero; the first is added to their pivots.
-_PIVOT_SHIFT, _ZERO_SLOPE = 1e-9, 1e-7
+# Slopes of a stroke by a tension that count as zero below the second; the first is added to their
+# pivots. Both as parts of the flexibility of a notch. A tendon that is held by the stiffness of its
+# memory has a slope of 2.5e-6 and is no such one.
+_PIVOT_SHIFT, _ZERO_SLOPE = 5e-9, 5e-7
 
 
 def linear_step(
@@ -591,9 +593,10 @@ def linear_step(
         matrix = slopes[0] + by_base[:, 1:]
         # Where every contact sticks, the stroke does not depend on the tension; a small pivot keeps
         # the step finite.
-        undetermined = command.by_stroke & (jnp.abs(jnp.diag(matrix)) < _ZERO_SLOPE)
+        flexibility = 1.0 / jnp.mean(chain.contact_stiffness)
+        is_zero = jnp.abs(jnp.diag(matrix)) < _ZERO_SLOPE * flexibility
         missing = command_residual(chain, command, memory.sheath, evaluation.base) + by_base[:, 0]
-        pivots = _PIVOT_SHIFT * jnp.diag(undetermined.astype(float))
+        pivots = _PIVOT_SHIFT * flexibility * jnp.diag(1.0 * (command.by_stroke & is_zero))
         tension_step = -gauss_jordan(matrix + pivots, missing[:, None])[:, 0]
 
     def follow(carried: Array, blocks: tuple[Array, Array]) -> tuple[Array, Array]:

@@ -580,26 +580,39 @@ def command_residual(
     chain: Chain, command: Command, memory: SheathMemory | None, base: BaseReaction
 ) -> OfTendons:
     """Compute the deviation of the tendons from their command, scaled like angles."""
+    tension, drawn = base.base_tension, stroke(chain, base)
+    if chain.sheath is None or memory is None:
+        return _deviation(chain, command, tension, drawn)
+    return sheath_contact(chain, command, memory, tension, drawn)[0]
+
+
+def _deviation(chain: Chain, command: Command, tension: Array, pulled: Array) -> OfTendons:
     # A tendon driven by stroke is slack where the robot has released more than is drawn: tension >=
     # 0, stroke released >= stroke commanded, product 0.
-    scale, drawn = chain.stroke_stiffness, stroke(chain, base)
+    scale, missing = chain.stroke_stiffness, pulled - command.target
+    # Switching keeps the digits that a difference with a large tension would lose.
+    by_stroke = jnp.where(tension >= scale * missing, missing, tension / scale)
+    return command.either(by_stroke, (tension - command.target) / scale)
 
-    def deviation(tension: Array, pulled: Array) -> Array:
-        missing = pulled - command.target
-        # Switching keeps the digits that a difference with a large tension would lose.
-        by_stroke = jnp.where(tension >= scale * missing, missing, tension / scale)
-        return command.either(by_stroke, (tension - command.target) / scale)
 
-    if chain.sheath is None or memory is None:
-        return deviation(base.base_tension, drawn)
+def sheath_contact(
+    chain: Chain, command: Command, memory: SheathMemory, tension: Array, drawn: Array
+) -> tuple[OfTendons, OfTendons]:
+    """Return what wires deviate by, and which slide all along: toward drive (1) or base (-1)."""
     # The sheath is one contact more. While the wire slides all along, drive and base are related by
     # exponentials, and the command decides; while it sticks, its end at the base keeps its place.
     # With the deviations where it would slide to either side, the law is that of friction:
     # clip(slip, toward the base, toward the drive) = 0.
-    sheath, tension = chain.sheath, base.base_tension
+    sheath = chain.sheath
+    assert sheath is not None
     limit = sheath.log_ratio(command.bend)
     toward_base, toward_drive = (
-        deviation(tension * jnp.exp(side * limit), drawn + sheath.end_stretch(side, limit, tension))
+        _deviation(
+            chain,
+            command,
+            tension * jnp.exp(side * limit),
+            drawn + sheath.end_stretch(side, limit, tension),
+        )
         for side in (-1.0, 1.0)
     )
     profile = within(memory, limit)
@@ -611,8 +624,9 @@ def command_residual(
     height, stiffness = jnp.max(notch_heights(chain)), chain.memory_stiffness
     kept = jnp.where(jnp.isinf(chain.axial_stiffness), change * height / stiffness, 0.0)
     slip = drawn - memory.stroke + stretched + kept
-    held = jnp.where(slip <= toward_base, toward_base, slip)
-    return jnp.where(slip >= toward_drive, toward_drive, held)
+    side = jnp.where(slip >= toward_drive, 1.0, jnp.where(slip <= toward_base, -1.0, 0.0))
+    slid = jnp.where(side > 0.0, toward_drive, toward_base)
+    return jnp.where(side == 0.0, slip, slid), side
 
 
 def without_slack(chain: Chain, command: Command, point: Iterate, reached: OfTendons) -> Iterate:

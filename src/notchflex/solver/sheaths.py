@@ -18,7 +18,7 @@ from notchflex.mechanics.sheath import (
     mean_tension,
     within,
 )
-from notchflex.solver.residual import Iterate, Memory, SolverState
+from notchflex.solver.residual import Iterate, Memory, SolverState, sheath_contact
 
 # Halvings of the range of a drive's ln T, and the least motion of a wire that its backlash follows,
 # mm.
@@ -53,20 +53,24 @@ def state_after(
         moved = from_base(from_drive(profile, drive, limit), base, limit)
         return moved, drawn + sheath.compliance * mean_tension(moved)
 
-    # The stroke of the wire's end rises with the tension of the drive: halving finds it. Its
-    # derivatives are those of a step of Newton's method from there.
-    target = aimed(chain, command, before).target
+    # Where a wire slides all along, the tension of the drive follows from that of the base: near
+    # there the stroke changes with its square, and would tell it by the root of what is left of the
+    # imbalance. Else the stroke of the wire's end rises with the tension of the drive: halving
+    # finds it. Its derivatives are those of a step of Newton's method from there.
+    aim = aimed(chain, command, before)
+    side = sheath_contact(chain, aim, before, point.base_tension, drawn)[1]
 
     def halve(_: Any, limits: tuple[Array, Array]) -> tuple[Array, Array]:
         middle = 0.5 * (limits[0] + limits[1])
-        less = ends(middle)[1] < target
+        less = ends(middle)[1] < aim.target
         return jnp.where(less, middle, limits[0]), jnp.where(less, limits[1], middle)
 
     low, high = stop(jax.lax.fori_loop(0, _HALVINGS, halve, (base - limit, base + limit)))
     found = 0.5 * (low + high)
     end, slope = jax.jvp(lambda drive: ends(drive)[1], (found,), (jnp.ones_like(found),))
-    step = (target - end) / stop(jnp.where(slope > 0.0, slope, jnp.inf))
-    drive = command.either(found + (step - stop(step)), log_tension(command.target))
+    step = (aim.target - end) / stop(jnp.where(slope > 0.0, slope, jnp.inf))
+    by_stroke = jnp.where(side == 0.0, found + (step - stop(step)), base + side * limit)
+    drive = command.either(by_stroke, log_tension(command.target))
     moved, end = ends(drive)
     tight = point.base_tension > 0.0
     tension = command.either(jnp.where(tight, jnp.exp(drive), 0.0), command.target)
