@@ -13,7 +13,6 @@ from notchflex._jax import choose, jax, jnp
 from notchflex.loads.command import Command
 from notchflex.mechanics.chain import Chain
 from notchflex.solver.newton import (
-    NewtonProblem,
     NewtonResult,
     Settings,
     newton,
@@ -69,7 +68,6 @@ class _Attempt(NamedTuple):
 
     Attributes:
         fraction: Length of the substep, as a fraction of the load step.
-        predicts: Whether contacts are predicted, where strokes are commanded.
         mode: Its mode.
         regularisation: Compliance of sticking contacts, slip in heights of the notch per change of
             the log ratio, or viscosity, a fraction of the stiffness at rest; 0 for neither.
@@ -77,7 +75,6 @@ class _Attempt(NamedTuple):
     """
 
     fraction: Float[Array, ""]
-    predicts: Bool[Array, ""]
     mode: Int[Array, ""] | int = _Mode.PLAIN
     regularisation: Float[Array, ""] | float = 0.0
     factor: Float[Array, ""] | float = 0.0
@@ -112,21 +109,17 @@ class _Attempt(NamedTuple):
         larger = jnp.where(viscosity > 0.0, 3.0 * viscosity, _VISCOSITY)
         viscous = self._replace(regularisation=jnp.where(converged, smaller, larger))
         gives_up = ~converged & (viscosity >= _MAX_VISCOSITY)
-        attempt = choose(gives_up, _Attempt(self.fraction, jnp.array(True)), viscous)
+        attempt = choose(gives_up, _Attempt(self.fraction), viscous)
         return choose(converged & (viscosity == 0.0), self._longer(), attempt)
 
     def _longer(self) -> _Attempt:
-        return _Attempt(2.0 * self.fraction, self.predicts)
+        return _Attempt(2.0 * self.fraction)
 
     def _shorter(self, can_snap: bool) -> _Attempt:
-        """Return half of it; a robot that can snap also tries a viscosity, or no prediction."""
-        # A softening notch contradicts the predictor: the tension falls as the stroke rises
-        # (`test_a_stroke_passes_the_limit_point`).
-        fraction = 0.5 * self.fraction
-        if not can_snap:
-            return _Attempt(fraction, self.predicts)
-        viscous = _Attempt(fraction, jnp.array(False), _Mode.SNAPPING, _VISCOSITY)
-        return choose(fraction < _SNAP_MAX_FRACTION, viscous, _Attempt(fraction, ~self.predicts))
+        """Return half of it; a robot that can snap also tries a viscosity."""
+        half = _Attempt(0.5 * self.fraction)
+        viscous = half._replace(mode=_Mode.SNAPPING, regularisation=_VISCOSITY)
+        return choose(can_snap & (half.fraction < _SNAP_MAX_FRACTION), viscous, half)
 
 
 class _Substeps(NamedTuple):
@@ -205,7 +198,7 @@ def solve_load_step(
     zero, none = jnp.zeros(()), jnp.zeros((), int)
     no, infinite, slack = jnp.array(False), jnp.array(jnp.inf), jnp.zeros(chain.tendons, bool)
     begun = LoadStepResult(last, infinite, none, no, zero, none, last, zero, slack)
-    first = _Attempt(jnp.ones(()), ~no, none, zero, zero)
+    first = _Attempt(jnp.ones(()), none, zero, zero)
     return jax.lax.while_loop(goes_on, proceed, _Substeps(begun, none, first, last.point)).result
 
 
@@ -255,12 +248,10 @@ def _solve_substep(
         largest = jnp.exp(chain.sheath.log_ratio(command.bend))
         towards = jnp.clip(before, towards / largest, towards * largest)
     base_tension = command.either(before, towards)
-    log_ratio = predict_log_ratios(chain, before, base_tension, memory)
-    predicts = attempt.predicts & (attempt.mode != _Mode.RELAXED)
-    if command.by_stroke is not None:
-        # Without prediction, contacts that slid before go on sliding.
-        sliding = jax.tree.map(lambda old: _BEYOND_BOUND * old, memory.log_ratio)
-        log_ratio = choose(predicts, log_ratio, sliding)
+    if command.by_stroke is None:
+        log_ratio = predict_log_ratios(chain, before, base_tension, memory)
+    else:  # contacts that slid before go on sliding
+        log_ratio = jax.tree.map(lambda old: _BEYOND_BOUND * old, memory.log_ratio)
     start = Iterate(solved.point.unknowns._replace(log_ratio=log_ratio), base_tension)
     regularised = jnp.any(state.start.unknowns.modes != solved.point.unknowns.modes)
     start = choose(regularised, state.start, start)
@@ -276,8 +267,7 @@ def _solve_substep(
     most = jnp.where(relaxed, _RELAXED_ITERATIONS, settings.max_iterations)
     settings = dataclasses.replace(settings, max_iterations=most)
     aim = aimed(chain, command, memory.sheath)
-    problem = NewtonProblem(chain, aim, memory, solved.point, predicts)
-    return newton(problem, start, settings, residual_target)
+    return newton(chain, aim, memory, start, settings, residual_target)
 
 
 def interpolate_command(

@@ -128,7 +128,6 @@ class _Iteration(NamedTuple):
     Attributes:
         best: The best point so far.
         allowed: Norm of the residual that the next point must not exceed.
-        predicts: Whether the predictor still sets the contacts, where a stroke is commanded.
         step: Step from the best point.
         fraction: Fraction of the step that is tried next.
         backtracks: Number of points tried from the best one.
@@ -137,30 +136,10 @@ class _Iteration(NamedTuple):
 
     best: NewtonResult
     allowed: Float[Array, ""]
-    predicts: Bool[Array, ""]
     step: Iterate
     fraction: Float[Array, ""]
     backtracks: Int[Array, ""]
     terminate: Bool[Array, ""]
-
-
-class NewtonProblem(NamedTuple):
-    """A command on a chain, after another solved state.
-
-    Attributes:
-        chain: The chain.
-        command: Tensions and strokes commanded, external loads.
-        memory: History of contacts and material, as of the last solved state.
-        last: Point of that state.
-        predicts: Whether contacts are predicted where a stroke is commanded. The predictor assumes
-            that the tension rises with the stroke, which is false where a notch softens.
-    """
-
-    chain: Chain
-    command: Command
-    memory: Memory
-    last: Iterate
-    predicts: Bool[Array, ""]
 
 
 # Largest rotation of a flexure in one step, rad; compare `MAX_LOG_RATIO_STEP`.
@@ -169,23 +148,21 @@ _MAX_BACKTRACKS = 7
 # The line search does not guard the first steps: where the motion of a tendon reverses, all its
 # contacts leave their bounds at once, and the residual rises before it falls.
 _UNGUARDED_STEPS = 8
-# With a stroke commanded, the predictor sets the contacts in the first iterations, while the
-# residual is above this value and, after the first steps, as long as each leaves at most this part
-# of it. Where other tendons bend the robot, contacts also slide at constant base tension: the
-# predictor does not know these, and Newton's method finds them (tests/solver/test_many_strokes.py).
-_PREDICTOR_STEPS, _PREDICTOR_SURE_STEPS = 15, 2
-_PREDICTOR_MIN_RESIDUAL, _PREDICTOR_FALL = 1e-4, 0.5
 # A residual below this multiple of the tolerance that no longer falls is rounding error.
 _ROUNDING = 100.0
 
 
 def newton(
-    problem: NewtonProblem, start: Iterate, settings: Settings, residual_target: Float[Array, ""]
+    chain: Chain,
+    command: Command,
+    memory: Memory,
+    start: Iterate,
+    settings: Settings,
+    residual_target: Float[Array, ""],
 ) -> NewtonResult:
     """Find the equilibrium near a point, to `residual_target` if above the tolerance."""
     # Every pass of the loop evaluates one point: the start, a full Newton step, or half of the
     # fraction tried before if that did not reduce the residual.
-    chain, command, memory, *_ = problem
     tolerance = settings.tolerance * rounding_growth(chain, start)
     target = jnp.maximum(tolerance, residual_target)
 
@@ -211,8 +188,8 @@ def newton(
         new = _result(chain, command, trial, evaluation, largest, best.iterations + 1, within)
         following = jax.lax.cond(
             accept & ~solved,
-            lambda: _next_step(problem, new, evaluation, search),
-            lambda: (search.predicts, search.step, 0.5 * search.fraction),
+            lambda: _next_step(chain, command, memory, trial, evaluation),
+            lambda: (search.step, 0.5 * search.fraction),
         )
         return _Iteration(
             choose(accept, new, best),
@@ -222,7 +199,7 @@ def newton(
             terminate=solved | at_rounding | (~accept & exhausted),
         )
 
-    best = jax.lax.while_loop(proceed, iterate, _begin(problem, start)).best
+    best = jax.lax.while_loop(proceed, iterate, _begin(chain, memory, start)).best
     # Forces of contacts that do not press, and tensions of slack tendons, are exactly zero.
     point = without_slack(chain, command, best.point, best.stroke)
     pushing = jax.tree.map(
@@ -241,15 +218,15 @@ def newton(
     )
 
 
-def _begin(problem: NewtonProblem, start: Iterate) -> _Iteration:
+def _begin(chain: Chain, memory: Memory, start: Iterate) -> _Iteration:
     """Return the state of the line search before the first evaluation."""
     unevaluated = NewtonResult(
         point=start,
-        slid=problem.memory.slid,
-        bound=problem.memory.bound,
+        slid=memory.slid,
+        bound=memory.bound,
         material=(),
-        stroke=jnp.zeros(problem.chain.tendons),
-        presses=tuple(group.has_contact > 1.0 for group in problem.chain.contact_pairs),
+        stroke=jnp.zeros(chain.tendons),
+        presses=tuple(group.has_contact > 1.0 for group in chain.contact_pairs),
         residual=jnp.array(jnp.inf),
         iterations=jnp.array(-1),
         converged=jnp.array(False),
@@ -257,7 +234,6 @@ def _begin(problem: NewtonProblem, start: Iterate) -> _Iteration:
     return _Iteration(
         best=unevaluated,
         allowed=jnp.array(jnp.inf),
-        predicts=problem.predicts,
         step=jax.tree.map(jnp.zeros_like, start),
         fraction=jnp.ones(()),
         backtracks=jnp.zeros((), int),
@@ -300,39 +276,17 @@ def _result(
 
 
 def _next_step(
-    problem: NewtonProblem, new: NewtonResult, evaluation: Evaluation, search: _Iteration
-) -> tuple[Bool[Array, ""], Iterate, Float[Array, ""]]:
-    """Return whether the predictor goes on, the step from here, and the fraction to try first."""
-    chain, command, memory, last, predicts = problem
-    point = new.point
+    chain: Chain, command: Command, memory: Memory, point: Iterate, evaluation: Evaluation
+) -> tuple[Iterate, Float[Array, ""]]:
+    """Return the step from a point, and the fraction of it to try first."""
     step = linear_step(chain, command, point, memory, evaluation)
     step = limit_slack(chain, point, step)
-    # Where strokes are commanded, contacts that reverse must not be limited on the way.
-    by_tension = command.by_stroke is None
     limited = partial(limit_closing, chain, point.unknowns, evaluation, step)
-    limited_linear = limited(jnp.ones(())) if by_tension else step
-    rotation = jnp.max(jnp.abs(limited_linear.unknowns.modes))
+    rotation = jnp.max(jnp.abs(limited(jnp.ones(())).unknowns.modes))
     log_ratio = jnp.max(jnp.abs(ravel_pytree(step.unknowns.log_ratio)[0]), initial=0.0)
-    max_fraction = jnp.minimum(1.0, _MAX_ROTATION_STEP / rotation)
-    linear_fraction = jnp.minimum(max_fraction, MAX_LOG_RATIO_STEP / log_ratio)
-    if by_tension:
-        return search.predicts, limited(linear_fraction), linear_fraction
-    assert command.by_stroke is not None
-    before = search.best
-    helps = new.residual < _PREDICTOR_FALL * before.residual
-    helps = helps | (before.iterations < _PREDICTOR_SURE_STEPS)
-    early = search.predicts & helps & (before.iterations < _PREDICTOR_STEPS)
-    early = jnp.any(command.by_stroke) & early & (new.residual > _PREDICTOR_MIN_RESIDUAL)
-
-    def predicted() -> Iterate:
-        limits = memory._replace(bound=new.bound)
-        fractions = linear_fraction, max_fraction
-        return predict_contacts(chain, command, limits, last, point, step, *fractions)
-
-    chosen = jax.lax.cond(early, predicted, lambda: step)
-    fraction = jnp.where(early, max_fraction, linear_fraction)
-    limited_step = limit_closing(chain, point.unknowns, evaluation, chosen, fraction)
-    return early, choose(predicts, chosen, limited_step), fraction
+    fraction = jnp.minimum(1.0, _MAX_ROTATION_STEP / rotation)
+    fraction = jnp.minimum(fraction, MAX_LOG_RATIO_STEP / log_ratio)
+    return limited(fraction), fraction
 
 
 # Predictor of the tensions along a tendon: the play operator of hysteresis.
@@ -408,38 +362,6 @@ def limit_slack(chain: Chain, point: Iterate, step: Iterate) -> Iterate:
         for limit in (of_group(limits, group)[None, :, None],)
     )
     return step._replace(unknowns=step.unknowns._replace(log_ratio=logs))
-
-
-def predict_contacts(
-    chain: Chain,
-    command: Command,
-    memory: Memory,
-    last: Iterate,
-    point: Iterate,
-    step: Iterate,
-    linear_fraction: Float[Array, ""],
-    fraction: Float[Array, ""],
-) -> Iterate:
-    """Replace the log ratios of a step by those of the friction predictor."""
-    # For tendons driven by stroke, whose tensions are unknown. Sticking contacts make a tendon very
-    # stiff, so the change of its tension is limited. `fraction` of the returned step is to be
-    # taken; of the linear step it would be `linear_fraction`.
-    assert command.by_stroke is not None
-    tension = point.base_tension + linear_fraction * step.base_tension
-    moderate = jnp.clip(
-        tension, 0.5 * point.base_tension, 2.0 * point.base_tension + chain.closing_force
-    )
-    tension = command.either(moderate, tension)
-    predicted = predict_log_ratios(chain, last.base_tension, tension, memory)
-    logs = []
-    for group, new, present, change in zip(
-        chain.groups, predicted, point.unknowns.log_ratio, step.unknowns.log_ratio, strict=True
-    ):
-        by_stroke = of_group(command.by_stroke, group)[None, :, None]
-        logs.append(jnp.where(by_stroke, new - present, linear_fraction * change) / fraction)
-    return Iterate(
-        step.unknowns._replace(log_ratio=tuple(logs)), (tension - point.base_tension) / fraction
-    )
 
 
 def _predict_sequentially(
