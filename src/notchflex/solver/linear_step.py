@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -564,11 +564,10 @@ def linear_step(
     size = unit.unknowns
     # Own unknowns as functions of 1, carried and beyond: du = response @ (1, c, b).
     right = jnp.concatenate([residual[..., None], rows.residual[..., size:]], axis=-1)
-    # The contact at a gap's end acts on no mode: eliminated first, it touches one row alone.
+    # The contact at the end of a gap acts on no mode: before that at its start, it changes one row.
     last = size - 2 * len(chain.tendon_order)
-    order = np.r_[:last, last + 1 : size : 2, last:size:2]
-    matrix = rows.residual[..., :size][..., order, :][..., order]
-    response = -gauss_jordan(matrix, right[..., order, :])[..., np.argsort(order), :]
+    pivots = [*range(last), *range(last + 1, size, 2), *range(last, size, 2)]
+    response = -gauss_jordan(rows.residual[..., :size], right, pivots)
 
     def insert(row: Array) -> Array:
         rest = jnp.pad(row[..., size:], ((0, 0), (0, 0), (1, 0)))
@@ -584,9 +583,10 @@ def linear_step(
     if command.by_stroke is not None:
         slopes, count = command_slopes(chain, command, memory.sheath, evaluation.base), len(order)
         # Rows in the order of the robot's tendons, over 1 and base tensions.
-        at_exit, tension_length = (
-            jnp.concatenate([rows[:, :1], rows[:, 1:] @ at_base], axis=1)[np.argsort(order)]
-            for rows in (back[len(back) - count :], total)
+        by_tendon = jnp.stack([back[len(back) - count :], total], axis=1)
+        by_tendon = jnp.stack([by_tendon[row] for row in np.argsort(order)], axis=1)
+        at_exit, tension_length = jnp.concatenate(
+            [by_tendon[..., :1], by_tendon[..., 1:] @ at_base], axis=-1
         )
         released = at_exit - tension_length / chain.memory_stiffness[:, None]
         by_base = slopes[1] @ released + slopes[2] @ tension_length
@@ -654,19 +654,23 @@ def _add_constant(rows: Float[Array, "k z"], by: Float[Array, " k"]) -> Float[Ar
 
 
 def gauss_jordan(
-    matrix: Float[Array, "*n u u"], right: Float[Array, "*n u r"]
+    matrix: Float[Array, "*n u u"], right: Float[Array, "*n u r"], order: Sequence[int] = ()
 ) -> Float[Array, "*n u r"]:
-    """Solve small systems by Gauss-Jordan elimination without pivoting."""
+    """Solve small systems by Gauss-Jordan elimination without pivoting, in order of the columns."""
     # Modes come first: their stiffness makes their pivots safe. A step drops the column that it has
     # cleared. The barrier keeps the compiler from recomputing earlier steps for every later one; a
     # loop takes twice as long, and many small factorisations by LAPACK two to seven times.
-    size = matrix.shape[-1]
+    columns = list(range(matrix.shape[-1]))
     table = jnp.concatenate([matrix, right], axis=-1)
-    for number in range(size):
-        is_pivot = (np.arange(size) == number)[:, None]
-        row = table[..., number : number + 1, :]
-        pivot = row[..., 1:] * (1.0 / row[..., :1])  # one division costs as much as ten products
+    for number in order or tuple(columns):
+        is_pivot = (np.arange(matrix.shape[-1]) == number)[:, None]
+        at = columns.index(number)
+        column = table[..., at : at + 1]
+        table = jnp.concatenate([table[..., :at], table[..., at + 1 :]], axis=-1)
+        columns.remove(number)
+        # One division costs as much as ten products.
+        pivot = table[..., number : number + 1, :] * (1.0 / column[..., number : number + 1, :])
         # The pivot's row is inserted, since a difference would lose its digits.
-        table = jnp.where(is_pivot, pivot, table[..., 1:] - table[..., :1] * pivot)
+        table = jnp.where(is_pivot, pivot, table - column * pivot)
         table = jax.lax.optimization_barrier(table)
     return table
