@@ -566,8 +566,8 @@ def linear_step(
     right = jnp.concatenate([residual[..., None], rows.residual[..., size:]], axis=-1)
     # The contact at the end of a gap acts on no mode: before that at its start, it changes one row.
     last = size - 2 * len(chain.tendon_order)
-    pivots = [*range(last), *range(last + 1, size, 2), *range(last, size, 2)]
-    response = -gauss_jordan(rows.residual[..., :size], right, pivots)
+    columns = [*range(last), *range(last + 1, size, 2), *range(last, size, 2)]
+    response = -gauss_jordan(rows.residual[..., :size], right, columns)
 
     def insert(row: Array) -> Array:
         rest = jnp.pad(row[..., size:], ((0, 0), (0, 0), (1, 0)))
@@ -576,9 +576,11 @@ def linear_step(
     # What is carried to the first flexure per unit of base tension: the tension itself.
     order, at_base = chain.tendon_order, np.zeros((unit.carried, chain.tendons))
     at_base[unit.carried - len(order) + np.arange(len(order)), order] = 1.0
-    by_stroke = command.by_stroke is not None
-    sums = rows.tension_length if by_stroke else rows.tension_length[:, :0]
-    condensed, back, total = _condense(*map(insert, (rows.to_next, rows.to_previous, sums)), unit)
+    # Only strokes depend on the sums of tension times length.
+    sums = rows.tension_length[:, : 0 if command.by_stroke is None else len(order)]
+    condensed, back, total = _condense(
+        insert(rows.to_next), insert(rows.to_previous), insert(sums), unit
+    )
     tension_step = command.target - point.base_tension
     if command.by_stroke is not None:
         slopes, count = command_slopes(chain, command, memory.sheath, evaluation.base), len(order)
