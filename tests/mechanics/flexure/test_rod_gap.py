@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 from scipy.special import ellipkinc
 
 import notchflex as nf
 from backbones import RATIO, YOUNG, Z, continuous, shot, stiffness
 from notchflex.errors import InputError
+from notchflex.mechanics.flexure import relative_pose, rod, rotation_error_estimate
 from notchflex.robot import from_table, robot_from_text, robot_text, to_table
 
 
@@ -300,3 +302,24 @@ def test_slopes_and_batches_know_every_number() -> None:
     for diameter, row in zip(diameters, rows, strict=True):
         single = nf.solve(robot.with_value("notch.diameter", diameter), load)
         np.testing.assert_allclose(np.squeeze(row), single.tip_position, atol=1e-11)
+
+
+def test_the_error_of_the_rotation_is_estimated() -> None:
+    """Against the same strains with fourteen places of the rotation for five."""
+    gap, tube = nf.RodGap(10.0, 1.0, uncut_length=0.0), nf.Tube(10.0, 1.0)
+    coarse, fine = rod(gap, tube), rod(gap, tube, 3)
+    # Modes are polynomials strain by strain; the fine rod has more of each.
+    strains, in_fine = (np.abs(each.basis).sum(axis=0).argmax(axis=0) for each in (coarse, fine))
+    random = np.random.default_rng(1)
+    ratios = list[float]()
+    for _ in range(60):
+        modes, same = np.zeros(coarse.modes), np.zeros(fine.modes)
+        for strain, scale in ((0, 0.3), (1, 0.3), (2, 0.1)):
+            own = np.flatnonzero(strains == strain)
+            modes[own] = scale * random.normal(size=len(own)) / np.arange(1, len(own) + 1)
+            same[np.flatnonzero(in_fine == strain)[: len(own)]] = modes[own]
+        ends = (relative_pose(coarse, modes).rotation, relative_pose(fine, same).rotation)
+        error = float(Rotation.from_matrix(np.asarray(ends[0]).T @ np.asarray(ends[1])).magnitude())
+        ratios.append(float(rotation_error_estimate(coarse, modes)) / error)
+    assert min(ratios) > 0.8
+    assert np.quantile(ratios, 0.9) < 3.0

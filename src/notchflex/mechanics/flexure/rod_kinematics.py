@@ -83,15 +83,19 @@ def _by_pair(rod: Rod, hat: Float[Array, " hat"]) -> Float[Array, "places 3 hat"
 
 def rotation_error_estimate(rod: Rod, modes: Modes) -> Float[Array, ""]:
     """Estimate the error of the rotation of a rod's end, rad; 0 in the plane."""
-    # The Magnus series is truncated after its second term. The next term is of the size of the
-    # rotations from place to place times their second terms; a twentieth of the sum of these was
-    # the error for a notch bent by 105 degrees, twisted and sideways (against more places).
+    # The Magnus series is truncated after its second term. For curvatures a + b s + c s^2 over a
+    # way h from place to place that term is h^3 [b, a] / 12, and the next are h^5 times
+    # [b, [b, a]] / 240, [a, [a, [a, b]]] / 720 and [a, [a, c]] / 360. The first two are at most
+    # the second term times a twentieth of the change of the rotation over h, or a sixtieth of its
+    # square. Without the third, the sum is 0.9 to 7 times the error of gaps and arcs.
     if rod.turn_pair is None:
         return jnp.zeros(())
     hat = jnp.concatenate([jnp.ones(1), modes])
     turns, _ = _turns(rod, hat)
-    second = _by_pair(rod, hat) @ hat
-    return 0.05 * jnp.sum(jnp.linalg.norm(turns, axis=-1) * jnp.linalg.norm(second, axis=-1))
+    second = jnp.linalg.norm(_by_pair(rod, hat) @ hat, axis=-1)
+    step = jnp.linalg.norm(turns[1:] - turns[:-1], axis=-1)
+    change = jnp.maximum(jnp.pad(step, (1, 0)), jnp.pad(step, (0, 1)))
+    return jnp.sum((change / 20.0 + jnp.sum(turns**2, axis=-1) / 60.0) * second)
 
 
 def rotations_before(values: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
