@@ -313,7 +313,8 @@ def test_the_error_of_the_rotation_is_estimated() -> None:
     random = np.random.default_rng(1)
     ratios = list[float]()
     for _ in range(60):
-        modes, same = np.zeros(coarse.modes), np.zeros(fine.modes)
+        modes: Any = np.zeros(coarse.modes)
+        same: Any = np.zeros(fine.modes)
         for strain, scale in ((0, 0.3), (1, 0.3), (2, 0.1)):
             own = np.flatnonzero(strains == strain)
             modes[own] = scale * random.normal(size=len(own)) / np.arange(1, len(own) + 1)
