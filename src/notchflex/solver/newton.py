@@ -147,7 +147,7 @@ _MAX_ROTATION_STEP = 0.5
 _MAX_BACKTRACKS = 7
 # The line search does not guard the first steps: where the motion of a tendon reverses, all its
 # contacts leave their bounds at once, and the residual rises before it falls.
-_UNGUARDED_STEPS = 3
+_UNGUARDED_STEPS = 6
 # A residual below this multiple of the tolerance that no longer falls is rounding error.
 _ROUNDING = 100.0
 
