@@ -156,6 +156,14 @@ def test_loops_that_others_do_not_change_stand_before_them(size):
     check(function, given(size), long=(size, size + 1))
 
 
+def test_a_choice_between_known_zeros_is_no_operation():
+    def function(vector):
+        zeros = jnp.zeros(4)
+        return vector + jnp.where(vector > 0.0, zeros, -zeros)
+
+    assert "select" not in lower(function, [np.ones(4)], (4,))[0].text
+
+
 @pytest.mark.parametrize("size", [3, 13])
 def test_picking_and_putting(size):
     def function(vector):
