@@ -3,7 +3,8 @@
 A strip of Liu 2022 and an arc notch with rigid ends are rods of one section: from the forces on all
 that is beyond (see forces.py) their curve is integrated anew from the far end back to the near one,
 by the law of the material alone, and must arrive there. The solver has a few polynomials for the
-curvature; what these miss is `moment_error`, and so much is allowed for.
+curvature; what these miss is `moment_error`, and so much is allowed for. The moments of a strip are
+those along its own curve, which the curvature told at its nodes integrates to.
 
 A U-link of Gao 2017 has another section everywhere, and so have strips with elastic ends. Of these
 is asked that the bending moment is one that the forces beyond have about some point of the strip.
@@ -11,24 +12,22 @@ is asked that the bending moment is one that the forces beyond have about some p
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import Chebyshev, Legendre
 from numpy.polynomial.legendre import leggauss
 from scipy.integrate import solve_ivp
 
 import notchflex as nf
 
 from .forces import State, about_z
-from .sections import left_by, strain_of
+from .sections import left_by, strain_of, stress
 
 _Z = np.array([0.0, 0.0, 1.0])
-_PLACES = np.linspace(0.0, 1.0, 101)  # from the far end of a rod
-# Where the solver tells moments: ten Gauss nodes along the strip; between the places moments are
-# interpolated to this, of the largest.
-_NODES = 0.5 * (1.0 - leggauss(10)[0])
-_BETWEEN = 1e-4
 _ACCURATE = 1e-10
+_DEGREE = 60  # of polynomials for the places along a curve
 # Relative, of all that acts; the modes hold the balance to less.
 MOMENT = 1e-6
 
@@ -62,7 +61,9 @@ def judge_planar_rods(state: State) -> list[str]:
     if state.undecided or not lies_flat(state):
         return []
     robot, problems = state.robot, []
-    missed = float(state.now.moment_error * np.abs(state.now.notch_moment).max())
+    # The error is that over the largest moment asked for, which is larger than told by at most it.
+    error = float(state.now.moment_error)
+    missed = error / (1.0 - error) * float(np.abs(state.now.notch_moment).max())
     for i, notch in enumerate(robot.notches):
         material = state.materials[i + 1]
         if isinstance(notch, nf.RodGap | nf.TableNotch):
@@ -164,34 +165,73 @@ def _integrated(state: State, i: int, rod: Rod, missed: float) -> list[str]:
     if not np.isfinite(law).all():
         return []
     allowed = rod.misses[0] + rod.misses[1] * rod.length * float(np.diff(law).max())
-    places = rod.length * _PLACES
-    curve = solve_ivp(
+    x, y, turn = solve_ivp(
         slope,
         (0.0, rod.length),
         np.zeros(3),
         method="DOP853",
-        t_eval=places,
         rtol=_ACCURATE,
         atol=_ACCURATE * rod.length,
-    ).y
-    x, y, turn = curve[:, -1]
-    near, begins = rod.near
-    angle = np.arctan2(begins @ across, begins @ onward) - turn
-    away = far + x * onward + y * across - near
-    angle = abs(np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi)
-    off = max(angle, np.abs(away).max() / rod.length)
-    found = []
+    ).y[:, -1]
+    found, off = [], _astray(rod, across, x, y, turn)
     if not off <= allowed:
         found.append(f"notch {i + 1}: its rod misses its end by {off:.1e} of {allowed:.1e}")
     if isinstance(state.robot.notches[i], nf.StripNotch):
-        told, along = float(state.now.notch_moment[i]), asked(*curve[:2])
-        at_nodes = np.interp(_NODES, _PLACES, along)
-        # Where both ends of the strip carry about the same, either may be told.
-        likely = [at_nodes[np.abs(at_nodes).argmax()], at_nodes[0], at_nodes[-1]]
-        off, most = float(np.abs(told - np.array(likely)).min()), float(np.abs(along).max())
-        near_by = (_BETWEEN + float(state.now.moment_error)) * most
-        if off > near_by + state.rounding * state.reach:
-            found.append(f"notch {i + 1}: {told:.3g} N mm, {off:.1e} off what the strip carries")
+        found += _as_told(state, i, rod, asked, missed)
+    return found
+
+
+def _astray(rod: Rod, across: np.ndarray, x: float, y: float, turn: float) -> float:
+    """How far a curve from the far end ends from the near one: rad, or parts of the length."""
+    (far, onward), (near, begins) = rod.far, rod.near
+    angle = np.arctan2(begins @ across, begins @ onward) - turn
+    away = far + x * onward + y * across - near
+    angle = abs(np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi)
+    return max(angle, np.abs(away).max() / rod.length)
+
+
+def _as_told(
+    state: State,
+    i: int,
+    rod: Rod,
+    asked: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    missed: float,
+) -> list[str]:
+    """Compare the moments of a strip with those asked for, along the curve of its told curvature.
+
+    The curve that the forces alone integrate to is none for that. From the far end on its moment
+    grows by what it is off, which bends it further: a difference at the far end becomes up to
+    cosh(length sqrt(force / stiffness)) times as large.
+    """
+    far, onward = rod.far
+    across = np.cross(_frames(state, i)[1][:, 1], onward)
+    used = np.asarray(state.node_length)[i] > 0.0  # rods of other kinds have more nodes
+    curvature = state.path.solver_quantity("notch_strain")[0][i, used, 1]
+    node, weight = leggauss(len(curvature))
+    ends, places = (0.0, rod.length), 0.5 * rod.length * (1.0 + node)  # from the near end
+    bent = Legendre.fit(places, curvature, len(places) - 1, domain=ends)
+    turn = bent.integ(lbnd=rod.length)
+    slope_x = Chebyshev.interpolate(lambda place: np.cos(turn(place)), _DEGREE, ends)
+    slope_y = Chebyshev.interpolate(lambda place: np.sin(turn(place)), _DEGREE, ends)
+    x, y = (slope.integ(lbnd=rod.length) for slope in (slope_x, slope_y))
+    found, off = [], _astray(rod, across, x(0.0), y(0.0), turn(0.0))
+    if not off <= rod.misses[0]:
+        found.append(f"notch {i + 1}: bent as told it misses its end by {off:.1e}")
+
+    carried = rod.second_moment / rod.edge * stress(state.materials[i + 1], curvature * rod.edge)
+    told, largest = float(state.now.notch_moment[i]), np.abs(carried).max()
+    off = max(np.abs(carried - told).min(), abs(largest - abs(told)))
+    if not off <= _ACCURATE * largest:
+        found.append(f"notch {i + 1}: {told:.3g} N mm, {off:.1e} off the largest of its curvature")
+    nothing = MOMENT * state.beyond(i + 1, far)[2][1] + state.rounding * state.reach
+    missing = carried - asked(x(places), y(places))
+    off = float(np.abs(missing).max())
+    if not off <= missed + nothing:
+        found.append(f"notch {i + 1}: bent by moments {off:.1e} N mm off what it carries")
+    # Curvatures that are constant or linear are among the polynomials: of these nothing is missed.
+    off = float(np.abs([missing @ weight, missing @ (weight * node)]).max())
+    if not off <= nothing:
+        found.append(f"notch {i + 1}: out of balance by {off:.1e} N mm")
     return found
 
 

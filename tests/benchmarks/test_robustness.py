@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -85,6 +86,35 @@ def test_a_robot_of_many_parts_is_judged(robustness):
 @pytest.mark.nightly
 def test_a_result_with_one_wrong_quantity_is_found(robustness):
     assert not robustness.CHECKS["spoiled"](1, 1)
+
+
+@pytest.mark.nightly
+def test_a_slender_strip_pulled_along_is_judged_by_its_own_curve(robustness):
+    """Its moment error, and that of its place, are many times those of the strip's own moment."""
+    spoiled = import_module("random_robots.spoiled")
+    strip = nf.StripNotch(height=2.0, strip_thickness=0.3, depth=5.0, uncut_length=5.0)
+    robot = nf.Robot(
+        name="a thick strip and a slender one",
+        tube=nf.Tube(8.8, 7.4, base_length=10.0),
+        notch=(replace(strip, strip_thickness=0.9), strip),
+        tendon=(nf.Tendon(3.5, path="straight"),),
+        material=nf.Linear(60_000.0),
+        friction=nf.Frictionless(),
+    )
+    loads = [nf.Load(tip_force=(force, 0.0, 0.5 * force)) for force in (10.0, 20.0, 40.0)]
+    paths = spoiled.solved(robot, loads)
+
+    def found(paths, robot=robot):
+        return {text.partition(": ")[0]: text for text in spoiled.findings(robot, paths, loads, 3)}
+
+    assert found(paths) == {}
+    for more in (1.0 - 1e-8, 1.0 + 1e-8):
+        other = [spoiled.Spoiled(path, notch_moment=more * path.notch_moment) for path in paths]
+        assert set(found(other)) == {"notch 1", "notch 2"}
+    for number in (1, 2):
+        name = f"notch[{number}].strip_thickness"
+        other = robot.with_value(name, 1.001 * robot.notches[number - 1].strip_thickness)
+        assert set(found(paths, other)) >= {f"notch {number}"}
 
 
 @pytest.mark.nightly

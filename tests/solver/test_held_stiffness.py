@@ -36,6 +36,9 @@ CASES = {
     "U-links, buckled": lambda: pushed(
         nf.load_robot("gao2017"), *((0.0, 0.0, -push) for push in (0.5, 1.0, 2.0, 3.0))
     ),
+    "four tendons by tension": lambda: pushed(
+        nf.load_robot("two-axis-wrist"), (0.02, 0.03, 0.0), tension=1.0
+    ),
     "four tendons, two by stroke": two_by_stroke,
 }
 
@@ -78,6 +81,15 @@ def test_as_by_dense_differentiation(name, margin):
     margin.within("eigenvalue", (path.smallest_eigenvalue / smallest - 1.0) / allowed, 1.0)
     assert path.determinant_sign.tolist() == sign.tolist()
     assert path.stable.tolist() == ((smallest > 0.0) & (sign > 0.0)).tolist()
+
+
+def test_a_tendon_without_tension_leaves_stability_as_it_is(margin):
+    with_another = WRIST.replace(tendon=(*WRIST.tendon, WRIST.tendon[0]))
+    alone, other = (
+        pushed(robot, (0.02, 0.0, 0.0), tension=0.8)[0] for robot in (WRIST, with_another)
+    )
+    margin.within("eigenvalue", other.smallest_eigenvalue / alone.smallest_eigenvalue - 1.0, 1e-9)
+    assert other.stable == alone.stable
 
 
 @pytest.mark.nightly

@@ -153,14 +153,15 @@ def _assemble(
     natural_gap = np.asarray(chain.rods.length).sum(-1)
     compliance = 1.0 / (_HOLDING_STIFFNESS * np.asarray(chain.contact_stiffness) * natural_gap)
     matrix[:, contacts, contacts] += compliance[:, None]
+    if by_stroke is None:
+        return matrix, np.zeros((states, 0, modes.size))
     tension_length = tension_length[:, np.argsort(order)]
     at_exit = back[:, form.beyond - len(order) :][:, np.argsort(order)]
     released = at_exit - tension_length / np.asarray(chain.memory_stiffness)[:, None]
-    if by_stroke is not None:
-        matrix[:, tensions] = slopes[:, 1] @ released + slopes[:, 2] @ tension_length
-        matrix[:, tensions[:, None], tensions] += slopes[:, 0]
-        soft = by_stroke / (_HOLDING_STIFFNESS * np.asarray(chain.stroke_stiffness))
-        matrix[:, tensions, tensions] += soft
+    matrix[:, tensions] = slopes[:, 1] @ released + slopes[:, 2] @ tension_length
+    matrix[:, tensions[:, None], tensions] += slopes[:, 0]
+    soft = by_stroke / (_HOLDING_STIFFNESS * np.asarray(chain.stroke_stiffness))
+    matrix[:, tensions, tensions] += soft
     return matrix, released[..., modes.ravel()]
 
 
