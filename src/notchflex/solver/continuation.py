@@ -82,7 +82,7 @@ class _Attempt(NamedTuple):
     def after_contacts(self, converged: Array, can_snap: bool) -> _Attempt:
         """Return what is tried after the equations as they are, or after a relaxed shape."""
         begun = self._replace(mode=_Mode.RELAXED, regularisation=_COMPLIANCE, factor=0.0)
-        plain = choose(converged, self._longer(), begun)
+        plain = choose(converged, _Attempt(2.0 * self.fraction), begun)
         # A compliance that fails is approached by the root of the factor, for tendons that are all
         # but slack (tests/solver/test_slight_tensions.py).
         compliance, root = self.regularisation, jnp.sqrt(self.factor)
@@ -93,10 +93,13 @@ class _Attempt(NamedTuple):
         relaxed = self._replace(regularisation=smaller, factor=factor)
         # Where contacts were not found directly, those of the next substep would not be either.
         further = begun._replace(fraction=2.0 * self.fraction)
+        half = _Attempt(0.5 * self.fraction)
+        viscous = half._replace(mode=_Mode.SNAPPING, regularisation=_VISCOSITY)
+        half = choose(can_snap & (half.fraction < _SNAP_MAX_FRACTION), viscous, half)
         relaxed = choose(
             converged,
             choose(compliance > 0.0, relaxed, further),
-            choose(retries, larger, self._shorter(can_snap)),
+            choose(retries, larger, half),
         )
         return choose(self.mode == _Mode.RELAXED, relaxed, plain)
 
@@ -110,16 +113,7 @@ class _Attempt(NamedTuple):
         viscous = self._replace(regularisation=jnp.where(converged, smaller, larger))
         gives_up = ~converged & (viscosity >= _MAX_VISCOSITY)
         attempt = choose(gives_up, _Attempt(self.fraction), viscous)
-        return choose(converged & (viscosity == 0.0), self._longer(), attempt)
-
-    def _longer(self) -> _Attempt:
-        return _Attempt(2.0 * self.fraction)
-
-    def _shorter(self, can_snap: bool) -> _Attempt:
-        """Return half of it; a robot that can snap also tries a viscosity."""
-        half = _Attempt(0.5 * self.fraction)
-        viscous = half._replace(mode=_Mode.SNAPPING, regularisation=_VISCOSITY)
-        return choose(can_snap & (half.fraction < _SNAP_MAX_FRACTION), viscous, half)
+        return choose(converged & (viscosity == 0.0), _Attempt(2.0 * self.fraction), attempt)
 
 
 class _Substeps(NamedTuple):

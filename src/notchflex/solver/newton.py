@@ -142,11 +142,13 @@ class _Iteration(NamedTuple):
     terminate: Bool[Array, ""]
 
 
-# Largest rotation of a flexure in one step, rad; compare `MAX_LOG_RATIO_STEP`.
-_MAX_ROTATION_STEP = 0.5
+# Largest rotation of a flexure, rad, and largest change of a log ratio in one step; beyond, the
+# linear model is not valid.
+_MAX_ROTATION_STEP, _MAX_LOG_RATIO_STEP = 0.5, 1.0
 _MAX_BACKTRACKS = 7
 # The line search does not guard the first steps: where the motion of a tendon reverses, all its
-# contacts leave their bounds at once, and the residual rises before it falls.
+# contacts leave their bounds at once, and the residual rises before it falls; so it does for every
+# notch that closes (tests/analysis/test_closing.py). What snaps is lost by more such steps.
 _UNGUARDED_STEPS = 6
 # A residual below this multiple of the tolerance that no longer falls is rounding error.
 _ROUNDING = 100.0
@@ -285,7 +287,7 @@ def _next_step(
     rotation = jnp.max(jnp.abs(limited(jnp.ones(())).unknowns.modes))
     log_ratio = jnp.max(jnp.abs(ravel_pytree(step.unknowns.log_ratio)[0]), initial=0.0)
     fraction = jnp.minimum(1.0, _MAX_ROTATION_STEP / rotation)
-    fraction = jnp.minimum(fraction, MAX_LOG_RATIO_STEP / log_ratio)
+    fraction = jnp.minimum(fraction, _MAX_LOG_RATIO_STEP / log_ratio)
     return limited(fraction), fraction
 
 
@@ -298,9 +300,6 @@ def _next_step(
 #
 # A contact with log ratio r and bound l absorbs l - r of a rise of ln T before it, or l + r of a
 # fall, and transmits the rest. Cumulative sums from the base therefore give all contacts at once.
-
-MAX_LOG_RATIO_STEP = 1.0
-"""Largest change of a log ratio in one step; beyond, the linear model is not valid."""
 
 # Fractions of the closing force below which a tendon is nearly slack, or below the solver's
 # tolerance; limit of the change of its log ratios in one step (only their sign counts).
@@ -354,7 +353,7 @@ def limit_slack(chain: Chain, point: Iterate, step: Iterate) -> Iterate:
     tension = jnp.maximum(jnp.abs(point.base_tension), jnp.abs(step.base_tension))
     tension = tension + chain.friction.offset()
     relative = tension / chain.closing_force
-    limits = jnp.where(relative <= _NEGLIGIBLE, _SMALL_LOG_RATIO, MAX_LOG_RATIO_STEP)
+    limits = jnp.where(relative <= _NEGLIGIBLE, _SMALL_LOG_RATIO, _MAX_LOG_RATIO_STEP)
     limits = jnp.where(relative <= _NEARLY_SLACK, limits, jnp.inf)
     logs = tuple(
         jnp.clip(change, -limit, limit)
