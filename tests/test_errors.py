@@ -110,7 +110,7 @@ def test_a_stroke_across_slack_names_the_constant_loss():
     robot = nf.load_robot("pacheco2021-a").replace(friction=nf.Capstan(0.13, constant_loss=15.0))
     pulled = nf.simulate(robot, [nf.Load(tension=pull) for pull in (18.0, 60.0, 172.5)])
     assert pulled.converged.all()
-    for stroke in (1.5, 2.0):
+    for stroke in (1.5, 2.5):
         assert pulled.stroke[0, 0] < stroke < pulled.stroke[2, 0]  # a tension reaches it
         path = nf.simulate(robot, [nf.Load(stroke=stroke)])
         assert path.reason_code == ["LOSS_LEAVES_SLACK"]

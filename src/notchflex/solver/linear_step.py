@@ -557,8 +557,7 @@ def linear_step(
     # Derivatives of the step are those of the residual, not those of the linear system: a step from
     # a solved state then changes as the solution does (implicit function theorem).
     unit = unit_rows(chain)
-    unknowns = point.unknowns
-    state = (chain, unknowns, memory, command.applied, evaluation)
+    state = (chain, point.unknowns, memory, command.applied, evaluation)
     rows = linearise(StateJacobians(*jax.tree.map(jax.lax.stop_gradient, state), unit=unit))
     residual = jax.vmap(lambda tree: ravel_pytree(tree)[0])(evaluation.residual)
     size = unit.unknowns
@@ -573,23 +572,20 @@ def linear_step(
         rest = jnp.pad(row[..., size:], ((0, 0), (0, 0), (1, 0)))
         return rest + row[..., :size] @ response
 
-    # What is carried to the first flexure per unit of base tension: the tension itself.
-    order, at_base = chain.tendon_order, np.zeros((unit.carried, chain.tendons))
-    at_base[unit.carried - len(order) + np.arange(len(order)), order] = 1.0
+    # (1, carried to the first flexure) by (1, base tensions): a tension is carried as it is.
+    order, at_base = chain.tendon_order, np.zeros((1 + unit.carried, 1 + chain.tendons))
+    at_base[0, 0] = 1.0
+    at_base[len(at_base) - len(order) + np.arange(len(order)), 1 + order] = 1.0
     # Only strokes depend on the sums of tension times length.
     sums = rows.tension_length[:, : 0 if command.by_stroke is None else len(order)]
-    condensed, back, total = _condense(
-        insert(rows.to_next), insert(rows.to_previous), insert(sums), unit
-    )
+    condensed, back, total = _condense(unit, *map(insert, (rows.to_next, rows.to_previous, sums)))
     tension_step = command.target - point.base_tension
     if command.by_stroke is not None:
         slopes, count = command_slopes(chain, command, memory.sheath, evaluation.base), len(order)
         # Rows in the order of the robot's tendons, over 1 and base tensions.
         by_tendon = jnp.stack([back[len(back) - count :], total], axis=1)
         by_tendon = jnp.stack([by_tendon[row] for row in np.argsort(order)], axis=1)
-        at_exit, tension_length = jnp.concatenate(
-            [by_tendon[..., :1], by_tendon[..., 1:] @ at_base], axis=-1
-        )
+        at_exit, tension_length = by_tendon @ at_base
         released = at_exit - tension_length / chain.memory_stiffness[:, None]
         by_base = slopes[1] @ released + slopes[2] @ tension_length
         matrix = slopes[0] + by_base[:, 1:]
@@ -607,17 +603,17 @@ def linear_step(
         return to_next @ homogeneous, jnp.concatenate([homogeneous, returned @ homogeneous])
 
     # (1, carried, from beyond) of every element, from the base to the tip.
-    surroundings = jax.lax.scan(follow, jnp.asarray(at_base) @ tension_step, condensed)[1]
+    surroundings = jax.lax.scan(follow, jnp.asarray(at_base[1:, 1:]) @ tension_step, condensed)[1]
     steps = jnp.einsum("nuz,nz->nu", response, surroundings)
-    _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], unknowns))
+    _, unknowns_of = ravel_pytree(jax.tree.map(lambda leaf: leaf[0], point.unknowns))
     return Iterate(jax.vmap(unknowns_of)(steps), tension_step)
 
 
 def _condense(
+    unit: UnitRows,
     to_next: Float[Array, "n c z"],
     to_previous: Float[Array, "n b z"],
     sums: Float[Array, "n k z"],
-    unit: UnitRows,
 ) -> tuple[
     tuple[Float[Array, "n c 1+c"], Float[Array, "n b 1+c"]],
     Float[Array, "b 1+c"],

@@ -166,7 +166,6 @@ def newton(
     # Every pass of the loop evaluates one point: the start, a full Newton step, or half of the
     # fraction tried before if that did not reduce the residual.
     tolerance = settings.tolerance * rounding_growth(chain, start)
-    target = jnp.maximum(tolerance, residual_target)
 
     def proceed(search: _Iteration) -> Bool[Array, ""]:
         return ~search.terminate & (search.best.iterations <= settings.max_iterations)
@@ -178,14 +177,12 @@ def newton(
         demand = command_residual(chain, command, memory.sheath, evaluation.base)
         scaled_residual = ravel_pytree((evaluation.residual, demand))[0]
         largest, size = jnp.max(jnp.abs(scaled_residual)), jnp.linalg.norm(scaled_residual)
-        unguarded = (best.iterations < _UNGUARDED_STEPS) & (best.residual >= _ROUNDING * tolerance)
-        falls = size <= search.allowed
-        better = falls | (unguarded & jnp.isfinite(size))
-        near = best.residual < _ROUNDING * tolerance
+        near, falls = best.residual < _ROUNDING * tolerance, size <= search.allowed
+        unguarded = (best.iterations < _UNGUARDED_STEPS) & ~near
         at_rounding = near & (largest >= best.residual) & ~falls
         exhausted = search.backtracks >= _MAX_BACKTRACKS
-        accept = better | (jnp.isfinite(size) & exhausted & ~at_rounding)
-        solved = accept & (largest < target)
+        accept = falls | (jnp.isfinite(size) & (unguarded | (exhausted & ~at_rounding)))
+        solved = accept & (largest < jnp.maximum(tolerance, residual_target))
         within = solved | (largest < _ROUNDING * tolerance)
         new = _result(chain, command, trial, evaluation, largest, best.iterations + 1, within)
         following = jax.lax.cond(
@@ -215,9 +212,8 @@ def newton(
         return best
     # The loop does not carry the memory: it is long, and only that of the last point counts.
     modes, chain = best.point.unknowns.modes, warmed(chain, command.applied)
-    return best._replace(
-        material=flexure_states(chain, modes, memory.material, with_pose=False).memory
-    )
+    state = flexure_states(chain, modes, memory.material, with_pose=False)
+    return best._replace(material=state.memory)
 
 
 def _begin(chain: Chain, memory: Memory, start: Iterate) -> _Iteration:
