@@ -7,12 +7,18 @@ import pytest
 from jax.flatten_util import ravel_pytree
 
 import notchflex as nf
-from notchflex._jax import jax
+from notchflex._jax import jax, jnp
 from notchflex.analysis.solve import prepare_for
 from notchflex.loads.command import make_commands
 from notchflex.loads.load_path import load_path
 from notchflex.solver.linear_step import linear_step
-from notchflex.solver.residual import Iterate, command_residual, evaluate
+from notchflex.solver.residual import (
+    AUGMENTATION,
+    Iterate,
+    command_residual,
+    evaluate,
+    trial_log_ratio,
+)
 
 TIP = {"tip_force": (0.02, 0.0, -0.01), "tip_moment": (0.0, 0.05, 0.0)}
 SIDE = {"tip_force": (0.02, 0.01, -0.01), "following": True, "gravity": (1.0, 2.0, 3.0)}
@@ -53,12 +59,25 @@ def test_it_is_the_dense_step(case: str, margin) -> None:
         left = ravel_pytree((found.residual, demand))[0]
         return left, left
 
+    def yielding(point: Iterate) -> jax.Array:
+        """What contacts that stick yield by in the step: the square of their imbalance."""
+        found = evaluate(ready.chain, point, rest.memory, wanted.applied)
+        largest = jnp.max(jnp.abs(ravel_pytree(found.residual.log_ratio)[0]))
+        ratios = point.unknowns.log_ratio
+        sticks = tuple(
+            jnp.abs(trial_log_ratio(ready.chain, ratios[k], span.slid, rest.memory, k)) < span.bound
+            for k, span in enumerate(found.spans)
+        )
+        nothing = jax.tree.map(jnp.zeros_like, point)
+        unknowns = nothing.unknowns._replace(log_ratio=sticks)
+        return AUGMENTATION * largest**2 * ravel_pytree(nothing._replace(unknowns=unknowns))[0]
+
     def condensed(point: Iterate) -> jax.Array:
         found = evaluate(ready.chain, point, rest.memory, wanted.applied)
         return ravel_pytree(linear_step(ready.chain, wanted, point, rest.memory, found))[0]
 
     matrix, left = jax.jit(jax.jacfwd(imbalance, has_aux=True))(where)
-    dense = np.linalg.solve(matrix, -left)
+    dense = np.linalg.solve(matrix + np.diag(jax.jit(yielding)(at)), -left)
     step = jax.jit(condensed)(at)
     margin.within("relative", (step - dense) / np.abs(dense).max(), 1e-8)
 
