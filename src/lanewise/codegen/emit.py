@@ -21,7 +21,11 @@ from lanewise.ir.control_flow import (
 )
 from lanewise.ir.graph import LANE_BITS, Block
 
-_HEAD = "define void @program(ptr %arguments, ptr %results, ptr noalias %arena, i64 %count)"
+# Without `alignstack` LLVM keeps vectors at any address of the stack, many across two cache lines.
+_HEAD = (
+    "define void @program(ptr %arguments, ptr %results, ptr noalias %arena, i64 %count) "
+    f"alignstack({8 * WIDTH})"
+)
 
 
 class Emitter:

@@ -137,7 +137,7 @@ def body_wrench(rotation: Float[Array, "d d"], loads: BodyLoads) -> Float[Array,
 
 def is_unloaded(load_path: LoadPath) -> bool:
     """Return whether no external load acts in any step."""
-    return all(load.is_nothing for load in load_path.different)
+    return all(load is NOTHING or load.is_nothing for load in load_path.different)
 
 
 def follows(load_path: LoadPath) -> bool:
@@ -265,15 +265,16 @@ def row_commands(
 
 def _bends(load: LoadPath, chain: Chain) -> Any:
     """Return the bend of the sheaths in every step, as `Command` has it."""
-    bends = [external.sheath_bend_deg for external in load.different]
-    if chain.sheath is None:
-        if any(bend is not None for bend in bends):
+    if chain.sheath is not None:
+        bends = (external.sheath_bend_deg for external in load.different)
+        return np.array([-1.0 if bend is None else radians(bend) for bend in bends])[load.which]
+    for external in load.different:  # every solve comes by
+        if external.sheath_bend_deg is not None:
             raise InputError.UNSUPPORTED(
                 "sheath_bend_deg has no effect: no tendon of the robot runs through a sheath; give "
                 "tendon.sheath_length (mm) and tendon.sheath_friction, or leave the bend out"
             )
-        return None
-    return np.array([-1.0 if bend is None else radians(bend) for bend in bends])[load.which]
+    return None
 
 
 def _of_plane(frame: Float[Array, "3 3"]) -> tuple[np.ndarray, np.ndarray]:

@@ -229,12 +229,11 @@ class ExternalLoad:
     @property
     def external(self) -> ExternalLoad:
         """The external loads alone, without what else a load may command."""
-        values = vars(self)
-        numbers = {name: values[name] for name in EXTERNAL}
-        if numbers == vars(NOTHING):
+        numbers = _external_values(vars(self))
+        if numbers == _external_values(vars(NOTHING)):
             return NOTHING
         load = object.__new__(ExternalLoad)
-        vars(load).update(numbers)  # checked already
+        vars(load).update(zip(EXTERNAL, numbers, strict=True))  # checked already
         return load
 
     @property
@@ -296,6 +295,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
 }
 EXTERNAL = tuple(field.name for field in fields(ExternalLoad))
 _DEFAULTS = tuple((field.name, field.default) for field in fields(ExternalLoad))
+_external_values = operator.itemgetter(*EXTERNAL)
 NOTHING = ExternalLoad()
 
 
@@ -386,13 +386,15 @@ class Load(ExternalLoad):
         values = vars(self)
         for name in ("tension", "stroke"):
             value = values[name]
+            if value is None:
+                continue
             if hasattr(value, "__array__"):
                 value = np.asarray(value).tolist()
             if isinstance(value, Sequence) and not isinstance(value, str | bytes):
                 values[name] = tuple(
                     None if each is None else _finite(each, name) for each in value
                 )
-            elif value is not None:
+            else:
                 values[name] = _finite(value, name)
         if self.base_rotation is not NO_VECTOR:
             values["base_rotation"] = check_turn(self.base_rotation)

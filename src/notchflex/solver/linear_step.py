@@ -515,7 +515,7 @@ def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     # A contact that sticks hands on all that its neighbours cannot hold, so that sliding would
     # advance by one contact in a step. Far from the solution it therefore yields in the slopes; as
     # it yields by the square of the imbalance, convergence stays quadratic.
-    imbalance = jnp.max(jnp.abs(ravel_pytree(jacobians.evaluation.residual.log_ratio)[0]))
+    imbalance = jacobians.evaluation.friction_imbalance
     compliance = jacobians.memory.slip_per_log_ratio(chain, group)[..., None] + imbalance**2
     stuck = -AUGMENTATION * (tendon.at_edges / height - compliance * tendon.log_ratio[None])
     value, bound = trial_log_ratio(chain, log_ratio, span.slid, jacobians.memory, k), span.bound

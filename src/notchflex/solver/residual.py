@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Bool, Float, Shaped
 
 from notchflex._jax import constant, jax, jnp
@@ -352,6 +353,7 @@ class Evaluation(NamedTuple):
         wrenches: On the bodies; None as the anchors.
         base: Sums over the chain, at the base.
         residual: Imbalance, in the form of the unknowns and scaled to be comparable.
+        friction_imbalance: Largest residual of the friction law at a contact.
     """
 
     flexure: FlexureState
@@ -361,6 +363,7 @@ class Evaluation(NamedTuple):
     wrenches: BodyWrenches | None
     base: BaseReaction
     residual: Unknowns
+    friction_imbalance: Float[Array, ""]
 
 
 def warmed(chain: Chain, applied: BodyLoads | None) -> Chain:
@@ -421,7 +424,8 @@ def evaluate(
         in_tendon_order(chain, tuple(span.released_length[0] for span in spans)),
         in_tendon_order(chain, tuple(span.tension_length[0] for span in spans)),
     )
-    return Evaluation(flexure, anchors, spans, contacts, wrenches, base, residual)
+    imbalance = jnp.max(jnp.abs(ravel_pytree(log_ratio)[0]), initial=0.0)
+    return Evaluation(flexure, anchors, spans, contacts, wrenches, base, residual, imbalance)
 
 
 def rounding_growth(chain: Chain, point: Iterate) -> Float[Array, ""]:
