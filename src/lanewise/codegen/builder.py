@@ -76,7 +76,7 @@ class IRBuilder:
         self.lines.append(f"{name} = {text}")
         return name
 
-    def limit_block(self) -> None:
+    def limit_block(self) -> bool:
         """Begin a new basic block if this one is long: LLVM's time grows faster than its length.
 
         LLVM would remove a plain jump, so it depends on what LLVM cannot know: that the number of
@@ -86,6 +86,8 @@ class IRBuilder:
             label = self.label()
             self.line(f"br i1 %never, label %stop, label %{label}")
             self.line(f"{label}:")
+            return True
+        return False
 
     def call(self, function: str, result: str, args: list[tuple[str, str]], flags: str = "") -> str:
         """Call one of LLVM's intrinsic functions."""

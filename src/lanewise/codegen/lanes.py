@@ -27,7 +27,7 @@ class LaneLoops:
         """Write a loop that computes nodes lane by lane."""
         graph, storage, builder, kept = self.graph, self.storage, self.builder, self.schedule.kept
         vector = batched or not storage.batched
-        outside = self._loop_invariants(members, vector)
+        outside, inside = self._loop_invariants(members, vector), set(members)
         for node in members:
             if node in kept:
                 storage.address_of(node)
@@ -51,7 +51,9 @@ class LaneLoops:
                 if node in kept:
                     at = storage.pointer(storage.address_of(node), index)
                     builder.store(at, local[node], graph.kind[node], vector)
-                builder.limit_block()
+                if builder.limit_block():
+                    for one in [one for one in local if one in kept or one not in inside]:
+                        del local[one]
 
         storage.loop(str(length), iteration, 1 if storage.batched else WIDTH)
 
