@@ -77,10 +77,10 @@ class IRBuilder:
         return name
 
     def limit_block(self) -> bool:
-        """Begin a new basic block if this one is long: LLVM's time grows faster than its length.
+        """Begin a new basic block if this one is long; return whether it did.
 
-        LLVM would remove a plain jump, so it depends on what LLVM cannot know: that the number of
-        rows is never negative.
+        LLVM's time grows faster than the length of a block. It would remove a plain jump, so the
+        jump depends on what LLVM cannot know: that the number of rows is never negative.
         """
         if self._block_length > _LONGEST_BLOCK:
             label = self.label()

@@ -52,6 +52,7 @@ class LaneLoops:
                     at = storage.pointer(storage.address_of(node), index)
                     builder.store(at, local[node], graph.kind[node], vector)
                 if builder.limit_block():
+                    # Values in memory are read again there: LLVM would copy them to the stack.
                     for one in [one for one in local if one in kept or one not in inside]:
                         del local[one]
 

@@ -562,7 +562,11 @@ class BatchTable:
         max_size = max(size for limit, size in _PIECE_SIZES.items() if count >= limit)
         rounds = -(-count // (max_size * cores))
         size = -(-count // (rounds * cores * WIDTH)) * WIDTH
-        return (self.rows[start : start + size] for start in range(0, count, size))
+        # Rows that run side by side take as long as the slowest: like loads are put together.
+        loads = self.batch.loads
+        target = np.abs(loads.load.target[loads.steps_of(self.batch.path_of[self.rows])])
+        rows = self.rows[np.argsort(target.max(axis=(1, 2)), kind="stable")]
+        return (rows[start : start + size] for start in range(0, count, size))
 
     def run(self, rows: Int[np.ndarray, " m"]) -> Arrays:
         """Solve a piece of the rows: quantities in the world, NaN where they are not known."""

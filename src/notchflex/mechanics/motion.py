@@ -18,9 +18,10 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Array, Float
+from numpy.polynomial.polynomial import polyder
 
 from notchflex._arrays import is_traced, xp
-from notchflex._jax import constant, jax, jnp
+from notchflex._jax import constant, jnp
 
 PLANE, IN_PLANE = slice(1, None, 2), slice(0, None, 2)
 
@@ -236,11 +237,21 @@ def left_slope_change(
     vector: Float[Array, " 3"], constant_vector: Float[Array, " 3"]
 ) -> Float[Array, "3 3"]:
     """Differentiate `left_slope(vector).T @ constant_vector` by the rotation vector."""
-    # With a the constant vector the product is a - b (v x a) + c v x (v x a), with coefficients b
-    # and c of |v|^2.
-    squared = vector @ vector
-    (_, second, third), (_, by_second, by_third) = jax.jvp(
-        _coefficients, (squared,), (jnp.ones_like(squared),)
+    # With w the constant vector the product is w - b (v x w) + c v x (v x w). The coefficients are
+    # functions of s = |v|^2 as a = sin(|v|) / |v| is: db/ds = (a - 2 b) / 2 s, dc/ds = (b - 3 c) /
+    # 2 s. Near zero the derivatives of their series are exact.
+    squared = _squared(vector)
+    coefficients = _coefficients(squared)
+    _, second, third = coefficients
+    small = squared < 1.0
+    near, far = jnp.where(small, squared, 0.0), jnp.where(small, 1.0, squared)
+    by_second, by_third = (
+        jnp.where(
+            small,
+            polynomial(polyder(_SERIES[k]), near),
+            0.5 * (coefficients[k - 1] - (k + 1) * coefficients[k]) / far,
+        )
+        for k in (1, 2)
     )
     once = cross(vector, constant_vector)
     twice = cross(vector, once)

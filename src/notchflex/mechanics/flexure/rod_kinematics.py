@@ -226,8 +226,8 @@ def _geometric_in_space(
 ) -> Float[Array, "modes modes"]:
     """Compute `geometric_stiffness` in space, where rotations do not commute."""
     # All is seen from the end, with which the wrench moves: to it a mode turns a place back by
-    # `left`, and moves it by `moved`. A place rotates all beyond it: its generalised force is its
-    # rotation times `beyond`, the moment of the wrench about it.
+    # `left`, and moves a step s by its own change, less left x s. A place rotates all beyond it:
+    # its generalised force is its rotation times `beyond`, the moment of the wrench about it.
     assert rod.turn_pair is not None
     assert state.from_place is not None
     turns, slope, by_turns = state.from_place
@@ -235,12 +235,16 @@ def _geometric_in_space(
     moment, force = end @ end_wrench[:3], end @ end_wrench[3:]
     crossed = jax.vmap(cross, in_axes=(0, None))
     left = state.turn[-1:] - jnp.concatenate([jnp.zeros_like(state.turn[:1]), state.turn])
-    moved = state.stepped - jax.vmap(cross)(left[1:-1], state.step[..., None])
     shares = jnp.concatenate([crossed(state.step, force), moment[None]])
     beyond = jnp.cumsum(shares[::-1], axis=0)[::-1]
+    arms, turned = crossed(state.stepped, force[:, None]), left[1:-1]
+    # (left x s) x F = s (left . F) - left (s . F)
+    along = jnp.einsum("c,gci->gi", force, turned)
+    moved = arms + (state.step @ force)[:, None, None] * turned
+    moved = moved - state.step[..., None] * along[:, None]
     moved_beyond = jnp.cumsum(moved[::-1], axis=0)[::-1]
     change = jax.vmap(cross)(left[:-1], beyond[..., None])
-    change = change + jnp.pad(crossed(moved_beyond, force[:, None]), ((0, 1), (0, 0), (0, 0)))
+    change = change + jnp.pad(moved_beyond, ((0, 1), (0, 0), (0, 0)))
     # The slopes of the rotations change with the modes too: by the slope of the exponential, and by
     # the pairs of the Magnus series.
     change = jnp.einsum("kdc,kdj->kcj", by_turns, change)
@@ -248,9 +252,8 @@ def _geometric_in_space(
     change = change + jax.vmap(left_slope_change)(turns, inside) @ slope
     answers = jnp.einsum("kdc,kd->kc", by_turns, beyond)
     pairs = jnp.einsum("kcij,kc->ij", rod.turn_pair[..., 1:, 1:], answers)
-    by_step = crossed(left[1:-1], force[:, None])
-    by_step = jnp.einsum("gci,gcj->ij", state.stepped, by_step)
-    return jnp.einsum("kci,kcj->ij", slope, change) + 2.0 * pairs + by_step
+    by_step = jnp.einsum("gci,gcj->ij", arms, turned)
+    return jnp.einsum("kci,kcj->ij", slope, change) + 2.0 * pairs - by_step
 
 
 class FlexureState(Pytree):
