@@ -248,7 +248,7 @@ def left_slope_change(
     by_second, by_third = (
         jnp.where(
             small,
-            polynomial(polyder(_SERIES[k]), near),
+            polynomial(polyder(_SERIES[k]).tolist(), near),
             0.5 * (coefficients[k - 1] - (k + 1) * coefficients[k]) / far,
         )
         for k in (1, 2)
