@@ -27,6 +27,7 @@ from .sections import left_by, strain_of, stress
 
 _Z = np.array([0.0, 0.0, 1.0])
 _ACCURATE = 1e-10
+_LEAST = 1e-30  # instead of nothing
 _DEGREE = 60  # of polynomials for the places along a curve
 # Relative, of all that acts; the modes hold the balance to less.
 MOMENT = 1e-6
@@ -134,7 +135,8 @@ def _arc(state: State, i: int, notch: nf.ArcNotch) -> Rod:
         couple=couple,
         edge=left.spine,
         second_moment=left.weak,
-        misses=(1e-7, 1.0),
+        # The moment error is that at the nodes; a law with kinks has more between them.
+        misses=(1e-7, 1.0 if isinstance(state.materials[i + 1], nf.Linear) else 3.0),
     )
 
 
@@ -160,11 +162,17 @@ def _integrated(state: State, i: int, rod: Rod, missed: float) -> list[str]:
 
     # What the modes may miss of the moment bends the rod by so much, where it is softest: that need
     # not be where the moment is largest. More than the material bears is nothing to compare.
-    high = max(np.abs(state.now.notch_moment[i]), abs(about))
-    law = [[bend(m), bend(m + missed)] for m in np.linspace(0.0, high, 40)]
+    high = max(np.abs(state.now.notch_moment[i]), abs(about), _LEAST)
+    moments = np.linspace(0.0, high, 40)
+    law = np.array([[bend(m), bend(m + missed)] for m in moments])
     if not np.isfinite(law).all():
         return []
     allowed = rod.misses[0] + rod.misses[1] * rod.length * float(np.diff(law).max())
+    # A curve that is off has other arms of the force, which turns it further: angles grow by
+    # sinh(x) / x with x = length sqrt(force / stiffness).
+    softness = np.diff(law[:, 0]).max() / moments[1]
+    x = max(rod.length * np.sqrt(softness * np.linalg.norm(pull)), _LEAST)
+    allowed *= np.sinh(x) / x
     x, y, turn = solve_ivp(
         slope,
         (0.0, rod.length),

@@ -9,11 +9,12 @@ degrees. Some draws are no robots and are refused.
 
 Loads go up to the range of the model. A notch that closes bears any tension in its plane: these go
 up to three times what closes half of the notches, and now and then far beyond. Nothing stops gaps,
-tables, and out of the plane a notch that is bent to its side. There tendons together pull no more
-than what bends the softest gap or table to its range, or three times what closes the softest notch;
-they press on no gap so that it buckles; and they draw no more than such tensions do. All loads from
-outside together have at most the moment that closes the softest notch, bends the softest gap or
-table to its range, or twists an arc notch by half a radian.
+tables, an arc notch that a tendon opens, and out of the plane a notch that is bent to its side.
+There tendons together pull no more than what bends the softest gap or table to its range, would
+close the softest notch that is opened, or three times what closes the softest notch; they press on
+no gap so that it buckles; and they draw no more than such tensions do. All loads from outside
+together, weight among them, have at most the moment that closes the softest notch, bends the
+softest gap or table to its range, or twists an arc notch by half a radian.
 """
 
 from __future__ import annotations
@@ -269,17 +270,25 @@ def elastic_modulus(material: Table) -> float:
     return material["elastic_modulus"]
 
 
-def softened(material: Table, strain: float) -> float:
-    """Return stress at a strain over what Young's modulus alone would give, about."""
+def kink(material: Table) -> tuple[float, float]:
+    """Return the strain where a law leaves Young's modulus, and the modulus beyond it, about."""
     modulus = elastic_modulus(material)
     if material["kind"] == "nitinol":
-        begin, beyond = material["plateau_stress"] / modulus, material["plateau_modulus"]
-    elif material["kind"] == "stress-strain":
+        return material["plateau_stress"] / modulus, material["plateau_modulus"]
+    if material["kind"] == "superelastic":
+        return material["transition_strain"], material["superelastic_modulus"]
+    if material["kind"] == "stress-strain":
         begin, last = material["strain"][0], material["strain"][-1]
-        beyond = (material["stress"][-1] - material["stress"][0]) / (last - begin)
-    else:
+        return begin, (material["stress"][-1] - material["stress"][0]) / (last - begin)
+    return math.inf, modulus
+
+
+def softened(material: Table, strain: float) -> float:
+    """Return stress at a strain over what Young's modulus alone would give, about."""
+    begin, beyond = kink(material)
+    if strain <= begin:
         return 1.0
-    return min(1.0, (begin + beyond / modulus * (strain - begin)) / strain)
+    return min(1.0, (begin + beyond / elastic_modulus(material) * (strain - begin)) / strain)
 
 
 def draw_friction(random: np.random.Generator) -> Table:
@@ -309,11 +318,18 @@ def most_tension(robot: Table, planar: bool) -> float:
     most = []
     for notch in robot["notch"]:
         stiff, angle, lever = reference(robot, notch)
-        times = 1.0 if notch["kind"] in ("rod", "table") else math.inf if planar else _SIDEWAYS
+        opened = min(toward(notch, tendon) for tendon in robot["tendon"]) < -1e-9
+        freely = notch["kind"] in ("rod", "table") or (notch["kind"] == "arc" and opened)
+        times = 1.0 if freely else math.inf if planar else _SIDEWAYS
         most.append(times * stiff * angle / lever / together)
         if notch["kind"] in ("rod", "table"):
             most.append(_UPRIGHT * stiff / notch["length"] / len(sides))
     return float(min(most))
+
+
+def toward(notch: Table, tendon: Table) -> float:
+    """Return the cosine between the direction of a notch and the side of a tendon."""
+    return math.cos(math.radians(tendon["direction_deg"] - notch["direction_deg"]))
 
 
 def most_stroke(robot: Table, tension: float, tendon: Table) -> float:
@@ -321,9 +337,12 @@ def most_stroke(robot: Table, tension: float, tendon: Table) -> float:
 
     Friction takes of the tension on the way.
     """
-    rows = [reference(robot, notch) for notch in robot["notch"] for _ in range(notch["repeat"])]
+    passed = [notch for notch in robot["notch"] for _ in range(notch["repeat"])]
     stroke, coefficient = 0.0, robot["friction"].get("coefficient", 0.0)
-    for stiff, angle, lever in rows[: tendon.get("end_body")]:
+    for notch in passed[: tendon.get("end_body")]:
+        stiff, angle, lever = reference(robot, notch)
+        if notch["kind"] == "arc":  # at its spine a tendon has hardly a lever
+            lever *= max(toward(notch, tendon), 0.0)
         bend = min(angle, tension * lever / stiff)
         stroke += lever * bend
         tension *= math.exp(-coefficient * bend)
@@ -392,6 +411,8 @@ def reference(robot: Table, notch: Table) -> tuple[float, float, float]:
         else:
             length = notch["strip_length"] + 2 * notch["slot_radius"]
             angle, lever = min(notch["slot_radius"] / outer, 0.3), 0.8 * outer
+            # Where only a part of a link yields, its few modes miss the moment.
+            angle = min(angle, 0.9 * kink(material)[0] * length / fibre)
     modulus = elastic_modulus(material) * softened(material, angle * fibre / length)
     return modulus * second / length, angle, lever
 
@@ -438,6 +459,15 @@ def sizes_of(robot: Table, planar: bool) -> tuple[float, float]:
         piece += notch["uncut_length"]
         length += notch["repeat"] * (piece + notch.get("strip_thickness", 0.0))
     return moment, moment / length
+
+
+def heaviest(robot: Table, length: float) -> float:
+    """Return the mass of a robot (g), with what may hang at its tip, as if it were a full tube."""
+    parts = (robot["material"], *(notch.get("material", {}) for notch in robot["notch"]))
+    density = max(part.get("density") or 0.0 for part in parts)
+    radius = robot["tube"]["outer_diameter"] / 2.0
+    disks = sum(notch["repeat"] * notch.get("disk_mass", 0.0) for notch in robot["notch"])
+    return 1e-6 * density * math.pi * radius**2 * length + disks
 
 
 @dataclass(frozen=True)
@@ -488,7 +518,9 @@ def draw_outside(random: np.random.Generator, robot: Table, planar: bool, frame:
         elif what == "tip_mass":
             load["tip_mass"] = size * force * 100
         elif what == "gravity":
-            load["gravity"] = 9.81 * within_ball(random, flat)
+            weight = 1e-3 * 9.81 * heaviest(robot, moment / force)
+            light = min(1.0, size * force / max(weight, 1e-300))
+            load["gravity"] = light * 9.81 * within_ball(random, flat)
         elif what == "base_rotation":
             load["base_rotation"] = turn * random.uniform(-1, 1, 3) * 3.0
         else:

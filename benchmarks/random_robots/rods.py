@@ -351,18 +351,21 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
 
 
 def masses(state: State) -> list[str]:
-    """Whether all weighs what the robot says: the sum, and of straight backbones its moment."""
+    """Whether all weighs what the robot says: the sum, and of straight backbones its moment.
+
+    What is cut as strips or links weighs less than if it were full.
+    """
     robot, chain, mass, first = state.robot, state.path.chain, 0.0, 0.0
-    if not all(isinstance(one, nf.RodGap | nf.TableNotch | nf.ArcNotch) for one in robot.notches):
-        return []
-    place = 0.0
+    place, known = 0.0, nf.RodGap | nf.TableNotch | nf.ArcNotch
     for i, notch in enumerate((None, *robot.notches)):
         tube, density = state.tubes[i], state.materials[i].density or 0.0
         ring = np.pi * (tube.outer_radius**2 - tube.inner_radius**2)
         parts = [(ring * state.length[i], state.length[i], getattr(notch, "disk_mass", None))]
         if notch is not None:
             area = ring
-            if not isinstance(notch, nf.TableNotch):
+            if not isinstance(notch, known):
+                area = np.pi * tube.outer_radius**2
+            elif not isinstance(notch, nf.TableNotch):
                 is_round = isinstance(notch, nf.RodGap)
                 area = (round_section(notch) if is_round else left_by(notch, tube)).area
             parts.insert(0, (area * height_of(notch), height_of(notch), None))
@@ -371,6 +374,8 @@ def masses(state: State) -> list[str]:
             mass, first = mass + weight, first + weight * (place + 0.5 * length)
             place += length
     told = np.asarray(chain.body_mass)
+    if not all(isinstance(notch, known) for notch in robot.notches):
+        return ["its bodies weigh more than if they were full"] if told.sum() > mass else []
     heights = [height_of(notch) for notch in robot.notches]
     starts = np.append(0.0, np.cumsum(state.length[:-1] + heights))
     lever = told @ (starts + np.asarray(chain.body_centre)[:, 2])

@@ -191,3 +191,21 @@ def test_robots_with_friction_and_loads(name: str, tensions: tuple[float, ...]) 
     # The base carries what acts at the tip.
     force = -path.quantity("base_force")  # that of the base on the robot, turned round
     np.testing.assert_allclose(force[:, :2], np.tile(sideways[:2], (3, 1)), atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "less"), [("liu2022", 0.7), ("gao2017", 0.9)])
+def test_roots_weigh_no_more_than_the_strip(name, less):
+    """Rigid ends have the whole strip, of the tube's own width; roots are stiff, not heavy."""
+    robot = nf.load_robot(name).with_values({"material.density": 6450.0, "notch.ends": "rigid"})
+    whole = robot.geometry.body_mass.sum()
+    rooted = robot.with_value("notch.ends", "elastic").geometry.body_mass.sum()
+    assert less - 0.05 < rooted / whole < 1.1
+
+
+def test_a_pull_along_the_strip_stretches_its_whole_section():
+    """Shear has five sixths of the section, stretch has all of it."""
+    state = nf.solve(pulled_strip(), nf.Load(tip_force=(0.5, 0.0, 0.0)))
+    stretch = state.path.solver_quantity("notch_strain")[0, 0, :, 0]
+    middle = len(stretch) // 2
+    area = 2.0 * 2.0 * 1.5  # of both walls
+    assert abs(stretch[middle]) == pytest.approx(0.5 / (1000.406 * area), rel=0.02)

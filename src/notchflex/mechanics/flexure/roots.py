@@ -226,7 +226,7 @@ def with_sideways(
         strong=section.second_moment_strong / about_x - 1.0,
         torsion=section.torsion_constant / ratio / about_z - 1.0,
         oblique=xp.where(on_wall, block[0, 1], 0.0),
-        sway=xp.where(on_wall, 0.0, sway / rest * section.area / ratio - 1.0),
+        sway=xp.where(on_wall, _STIFF, sway / rest * section.area / ratio) - 1.0,
     )
     return dataclasses.replace(section, ends=ends)
 
@@ -261,17 +261,14 @@ def strip_sections(
     # Between the strip and its hinges only shear and stretch are left; a hinge has none of them.
     turned = xp.where(on_wall, walls.second_moment_weak * hinge.turn / hinge.up, _STIFF)
     pulled = xp.where(bent, 1.0 + hinge.pulled * area / (2.0 * strip.half), 1.0)
-    shear_area = 5.0 / 6.0
+    shear = 6.0 / 5.0  # over that of a stress which is even over the section
     ends = NotchEnds(
         weak=xp.where(bent, twisting * square / (1.0 - square), turned - 1.0),
-        axial=xp.where(on_wall, 0.0, shear_area * pulled - 1.0),
+        axial=xp.where(on_wall, _STIFF, pulled) - 1.0,
+        push=xp.where(on_wall, _STIFF, shear) - 1.0,
         material_share=1.0,  # the root yields where the strip does
     )
-    return dataclasses.replace(
-        about_neutral_axis(walls),
-        area=area * xp.where(on_wall, 1.0 / _STIFF, shear_area),
-        ends=ends,
-    )
+    return dataclasses.replace(about_neutral_axis(walls), ends=ends)
 
 
 def rooted_strip_rod(
