@@ -273,7 +273,8 @@ def _energy(before: State, state: State) -> list[str]:
     alike = np.array_equal(first.contact_state, second.contact_state, equal_nan=True)
     between = 0.5 * np.abs(state.pull - before.pull) * np.abs(drawn)
     open_ = 0.0 if alike and taut.all() else float(between.sum())
-    off = max(abs(gained + heat - work - float(pulls.sum())) - open_, 0.0) / max(size, 1e-300)
+    size = max(size, 1e-150)  # what remains of a robot at rest are squares of rounding
+    off = max(abs(gained + heat - work - float(pulls.sum())) - open_, 0.0) / size
     found = []
     if not off <= (_ROUGH if getattr(robot.friction, "coefficient", 0.0) else _SMOOTH):
         found.append(
