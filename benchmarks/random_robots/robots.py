@@ -462,7 +462,7 @@ def sizes_of(robot: Table, planar: bool) -> tuple[float, float]:
 
 
 def heaviest(robot: Table, length: float) -> float:
-    """Return the mass of a robot (g), with what may hang at its tip, as if it were a full tube."""
+    """Return the mass of a robot (g) with its disks, as if it were full and of its densest part."""
     parts = (robot["material"], *(notch.get("material", {}) for notch in robot["notch"]))
     density = max(part.get("density") or 0.0 for part in parts)
     radius = robot["tube"]["outer_diameter"] / 2.0

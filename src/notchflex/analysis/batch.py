@@ -564,8 +564,8 @@ class BatchTable:
         size = -(-count // (rounds * cores * WIDTH)) * WIDTH
         # Rows that run side by side take as long as the slowest: like loads are put together.
         loads = self.batch.loads
-        target = np.abs(loads.load.target[loads.steps_of(self.batch.path_of[self.rows])])
-        rows = self.rows[np.argsort(target.max(axis=(1, 2)), kind="stable")]
+        largest = abs(loads.load.target).reshape(len(loads), -1).max(axis=1)
+        rows = self.rows[np.argsort(largest[self.batch.path_of[self.rows]], kind="stable")]
         return (rows[start : start + size] for start in range(0, count, size))
 
     def run(self, rows: Int[np.ndarray, " m"]) -> Arrays:
