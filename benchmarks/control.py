@@ -1,12 +1,13 @@
 """How well targets are met, and how fast a controller is.
 
-    python benchmarks/control.py [accuracy] [speed] [rate] [--paths 200] [--seconds 60]
+    python benchmarks/control.py [accuracy] [speed] [rate] [viewer] [--paths 200] [--seconds 60]
 
 `accuracy`: tips of random forward paths of 20 steps, each to be reached from the state before it.
 `speed`: a controller in a loop of a fixed rate; times of the processor, beside the load of the
 machine, and of the wall. `rate`: a controller whose drives change by a twentieth of the largest
-tension in a step, with all notches pulled together and let go. What friction history and feedback
-are worth is on docs/control.md (`docs/make/control.py`).
+tension in a step, with all notches pulled together and let go. `viewer`: updates of the viewer,
+beside solves of the same loads; all else in an update is drawing. What friction history and
+feedback are worth is on docs/control.md (`docs/make/control.py`).
 """
 
 from __future__ import annotations
@@ -129,11 +130,39 @@ def limited_rate(name: str) -> dict[str, object]:
     }
 
 
+def viewer_updates(name: str) -> dict[str, object]:
+    """Pull a tendon in the viewer and let go; solve the same loads without it."""
+    from notchflex.viewer import Viewer
+
+    robot, (_, largest) = nf.load_robot(name), LOOPS[name]
+    viewer = Viewer(robot, port=18190)
+    up = np.linspace(0.02, 1.0, 40) * largest
+    tensions = np.concatenate([[0.01 * largest], up, up[::-1]]).tolist()
+    updates, solves, state = [], [], None
+    for tension in tensions:
+        with timed() as taken:
+            viewer.advance(viewer.session.controls.with_tendon(0, "tension", tension))
+        updates.append(taken["cpu"])
+        with timed() as taken:
+            state = nf.solve(robot, nf.Load(tension=tension), from_state=state).state
+        solves.append(taken["cpu"])
+    viewer.server.stop()
+    update, solve = (1e3 * float(np.mean(seconds[1:])) for seconds in (updates, solves))
+    return {
+        "robot": name,
+        "update, CPU ms": update,
+        "solve, CPU ms": solve,
+        "ratio": update / solve,
+    }
+
+
 if __name__ == "__main__":
-    chosen = options(__doc__, ("accuracy", "speed", "rate"), paths=200, seconds=60.0)
+    chosen = options(__doc__, ("accuracy", "speed", "rate", "viewer"), paths=200, seconds=60.0)
     if "accuracy" in chosen.cases:
         show(accuracy(name, chosen.paths) for name in LARGEST)
     if "speed" in chosen.cases:
         show(speed(name, chosen.seconds) for name in LOOPS)
     if "rate" in chosen.cases:
         show(limited_rate(name) for name in LARGEST if name.startswith("pacheco"))
+    if "viewer" in chosen.cases:
+        show(viewer_updates(name) for name in LOOPS)
