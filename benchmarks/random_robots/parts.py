@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 
 Table = dict[str, Any]
+COLDEST, _WARMEST = -20.0, 60.0
+"""Temperatures, °C."""
 _MOST_GAPS = 12
 # A table ends beyond the angle at which it closes, mostly: beyond its ends nothing is computed.
 _CLOSES = 0.9
@@ -305,7 +307,7 @@ def _sheath(random: np.random.Generator, outer: float, elastic: float) -> Table:
 
 
 def _temperature(random: np.random.Generator, material: Table) -> Table:
-    """Return temperatures of a material whose plateaus stay above 0 between -20 and 60 °C."""
+    """Return temperatures of a material whose plateaus stay above 0 in the greatest cold."""
     lowest = material.get("unloading_stress") or material.get("plateau_stress")
     if lowest is None:
         lowest = material["elastic_modulus"] * material["transition_strain"]
@@ -314,7 +316,7 @@ def _temperature(random: np.random.Generator, material: Table) -> Table:
         "plateau_slope": min(60.0, lowest / 60.0 * random.uniform(0.0, 0.95)),
     }
     if random.random() < 0.5:
-        table["temperature"] = float(random.uniform(-20.0, 60.0))
+        table["temperature"] = float(random.uniform(COLDEST, _WARMEST))
     return table
 
 
@@ -354,7 +356,7 @@ def mix_loads(
     of_tube = [notch["kind"] != "table" and "material" not in notch for notch in robot["notch"]]
     own = any("material" in notch for notch in robot["notch"])
     if "reference_temperature" in material and any(of_tube) and not own and warms < 0.7:
-        course = random.uniform(-20.0, 60.0, steps)
+        course = random.uniform(COLDEST, _WARMEST, steps)
         held = int(random.integers(0, steps))
         course[held:] = course[held]
         for load, value in zip(loads, course.tolist(), strict=True):

@@ -11,10 +11,11 @@ Loads go up to the range of the model. A notch that closes bears any tension in 
 up to three times what closes half of the notches, and now and then far beyond. Nothing stops gaps,
 tables, an arc notch that a tendon opens, and out of the plane a notch that is bent to its side.
 There tendons together pull no more than what bends the softest gap or table to its range, would
-close the softest notch that is opened, or three times what closes the softest notch; they press on
-no gap so that it buckles; and they draw no more than such tensions do. All loads from outside
-together, weight among them, have at most the moment that closes the softest notch, bends the
-softest gap or table to its range, or twists an arc notch by half a radian.
+close the softest notch that is opened, lets the softest U-link yield, or three times what closes
+the softest notch of other kinds; they press on no gap so that it buckles; and they draw no more
+than such tensions do. All loads from outside together, weight among them, have at most the moment
+that closes the softest notch, bends the softest gap or table to its range, or twists an arc notch
+by half a radian, and do not buckle the robot.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ import notchflex as nf
 from notchflex.robot import Drive, Fatigue
 
 from .draws import POWERS, Draw, enlarged
-from .parts import mix_loads, mix_notches, mix_others
+from .parts import COLDEST, mix_loads, mix_notches, mix_others
 from .sections import section_of
 
 Table = dict[str, Any]
@@ -47,6 +48,8 @@ ROUND = {"arc", "rod", "table"}  # kinds over which a tendon may lie on any side
 # tendons together may press on a gap, times its length over its stiffness: hinged at both ends it
 # would buckle at pi**2, and bends to its side before.
 _SIDEWAYS, _UPRIGHT = 3.0, 3.0
+# What loads from outside may press on a robot, times its length over its stiffness.
+_COLUMN = 2.0
 # How far loads from outside may twist an arc notch, rad.
 _TWISTED = 0.5
 STIFF = (
@@ -271,12 +274,17 @@ def elastic_modulus(material: Table) -> float:
 
 
 def kink(material: Table) -> tuple[float, float]:
-    """Return the strain where a law leaves Young's modulus, and the modulus beyond it, about."""
-    modulus = elastic_modulus(material)
+    """Return the strain where a law leaves Young's modulus, and the modulus beyond it, about.
+
+    A law that depends on the temperature does so first in the greatest cold of parts.py.
+    """
+    modulus, cold = elastic_modulus(material), 0.0
+    if "reference_temperature" in material:
+        cold = material["plateau_slope"] * (material["reference_temperature"] - COLDEST) / modulus
     if material["kind"] == "nitinol":
-        return material["plateau_stress"] / modulus, material["plateau_modulus"]
+        return material["plateau_stress"] / modulus - cold, material["plateau_modulus"]
     if material["kind"] == "superelastic":
-        return material["transition_strain"], material["superelastic_modulus"]
+        return material["transition_strain"] - cold, material["superelastic_modulus"]
     if material["kind"] == "stress-strain":
         begin, last = material["strain"][0], material["strain"][-1]
         return begin, (material["stress"][-1] - material["stress"][0]) / (last - begin)
@@ -320,11 +328,18 @@ def most_tension(robot: Table, planar: bool) -> float:
         stiff, angle, lever = reference(robot, notch)
         opened = min(toward(notch, tendon) for tendon in robot["tendon"]) < -1e-9
         freely = notch["kind"] in ("rod", "table") or (notch["kind"] == "arc" and opened)
-        times = 1.0 if freely else math.inf if planar else _SIDEWAYS
+        # Where only a part of a link yields, its few modes miss the moment.
+        links = notch["kind"] == "u-link" and yields(robot, notch)
+        times = 1.0 if freely else math.inf if planar else 1.0 if links else _SIDEWAYS
         most.append(times * stiff * angle / lever / together)
         if notch["kind"] in ("rod", "table"):
             most.append(_UPRIGHT * stiff / notch["length"] / len(sides))
     return float(min(most))
+
+
+def yields(robot: Table, notch: Table) -> bool:
+    """Return whether the law of a notch leaves Young's modulus."""
+    return kink(notch.get("material", robot["material"]))[0] < math.inf
 
 
 def toward(notch: Table, tendon: Table) -> float:
@@ -411,7 +426,6 @@ def reference(robot: Table, notch: Table) -> tuple[float, float, float]:
         else:
             length = notch["strip_length"] + 2 * notch["slot_radius"]
             angle, lever = min(notch["slot_radius"] / outer, 0.3), 0.8 * outer
-            # Where only a part of a link yields, its few modes miss the moment.
             angle = min(angle, 0.9 * kink(material)[0] * length / fibre)
     modulus = elastic_modulus(material) * softened(material, angle * fibre / length)
     return modulus * second / length, angle, lever
@@ -458,7 +472,9 @@ def sizes_of(robot: Table, planar: bool) -> tuple[float, float]:
         piece = notch.get("length", notch.get("height", 2 * notch.get("slot_radius", 0.0)))
         piece += notch["uncut_length"]
         length += notch["repeat"] * (piece + notch.get("strip_thickness", 0.0))
-    return moment, moment / length
+    # A column held at its base buckles under pi**2 / 4 of the stiffness of all notches together.
+    soft = sum(notch["repeat"] / row[0] for notch, row in zip(robot["notch"], rows, strict=True))
+    return moment, min(moment, _COLUMN / soft) / length
 
 
 def heaviest(robot: Table, length: float) -> float:
