@@ -442,10 +442,9 @@ def rotation_of(vector: tuple[float, ...]) -> Float[np.ndarray, "3 3"] | None:
     """Return the rotation matrix of a rotation vector; None for the identity."""
     if not any(vector):
         return None
-    from notchflex._jax import constant  # not before it is needed: importing JAX takes a second
-    from notchflex.mechanics.motion import rotation_about
+    from scipy.spatial.transform import Rotation  # not before it is needed: 0.1 s
 
-    rotation = np.array(rotation_about(constant(vector)))
+    rotation = Rotation.from_rotvec(vector).as_matrix()
     rotation.setflags(write=False)
     return rotation
 

@@ -18,17 +18,15 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Array, Float
-from numpy.polynomial.polynomial import polyder
 
 from notchflex._arrays import is_traced, xp
 from notchflex._jax import constant, jnp
 
 PLANE, IN_PLANE = slice(1, None, 2), slice(0, None, 2)
 
-# Coefficients of sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 as polynomials in a^2, used for
-# angles up to one radian: with eleven terms the first one left out is below 1e-22 there. The
-# closed forms, used above, would lose digits near zero, and have no derivative at it.
-_SERIES = [[(-1.0) ** k / factorial(2 * k + start) for k in range(11)] for start in (1, 2, 3)]
+# Series in a^2 of sin(a)/a, (1 - cos a)/a^2 and, of what follows (a - sin a)/a^3 in this row, the
+# two next. For angles of a quarter of a turn the first term left out is below 1e-16 of the first.
+_SERIES = [[(-1.0) ** k / factorial(2 * k + start) for k in range(9)] for start in (1, 2, 4, 5)]
 
 
 Vector = Float[Array, "d ..."]
@@ -150,18 +148,27 @@ def unskew(matrix: Matrix) -> Angular:
     )
 
 
-def _coefficients(squared: Float[Array, ""]) -> tuple[Array, Array, Array]:
-    """Compute sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 from a squared angle."""
-    small = squared < 1.0
-    near = xp.where(small, squared, 0.0)
-    angle = xp.sqrt(xp.where(small, 1.0, squared))
-    sine, cosine = sine_cosine(angle)
-    far = (sine / angle, (1.0 - cosine) / angle**2, (angle - sine) / angle**3)
-    first, second, third = (
-        xp.where(small, polynomial(series, near), closed)
-        for series, closed in zip(_SERIES, far, strict=True)
-    )
-    return first, second, third
+def _coefficients(squared: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], ...]:
+    """Compute sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 from a squared angle, and the two next.
+
+    Each is the first term of its series less a^2 times the one after the next.
+    """
+    # The last two of a quarter of the angle come from their series, and the angle is doubled twice:
+    # up to a whole turn no digits are lost, and there is no case near zero.
+    squared = 0.0625 * squared
+    fourth, fifth = (polynomial(series, squared) for series in _SERIES[2:])
+    first, second, third = _earlier(squared, fourth, fifth)
+    for _ in range(2):
+        fourth, fifth = 0.125 * third * (1.0 + first), 0.0625 * (fourth + fifth + second * third)
+        squared = 4.0 * squared
+        first, second, third = _earlier(squared, fourth, fifth)
+    return first, second, third, fourth, fifth
+
+
+def _earlier(squared: Array, fourth: Array, fifth: Array) -> tuple[Array, Array, Array]:
+    """Compute the first three of the `_coefficients` from the two others."""
+    third = 1.0 / 6.0 - squared * fifth
+    return 1.0 - squared * third, 0.5 - squared * fourth, third
 
 
 def polynomial(coefficients: Sequence[float], variable: Any) -> Any:
@@ -181,8 +188,8 @@ def sine_cosine(angle: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Ar
     turn = 2.0 * np.pi
     quarter = 0.25 * (angle - turn * jnp.round(angle / turn))
     squared = quarter * quarter
-    sine = quarter * polynomial(_SERIES[0][:9], squared)
-    versine = squared * polynomial(_SERIES[1][:9], squared)
+    sine = quarter * polynomial(_SERIES[0], squared)
+    versine = squared * polynomial(_SERIES[1], squared)
     cosine = 1.0 - versine
     sine, cosine = 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
     return 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
@@ -223,13 +230,13 @@ def rotation_about(vector: Float[Array, "*n a"]) -> Matrix:
     if vector.shape[-1] == 1:
         sine, cosine = sine_cosine(vector[..., 0])
         return xp.stack([cosine, sine, -sine, cosine], -1).reshape(*vector.shape[:-1], 2, 2)
-    first, second, _ = _coefficients(_squared(vector))
+    first, second, *_ = _coefficients(_squared(vector))
     return _quadratic(skew(vector), first, second)
 
 
 def left_slope(vector: Float[Array, "*n 3"]) -> Float[Array, "*n 3 3"]:
     """Return the left Jacobian of SO(3): rotation in the outer frame per change of its vector."""
-    _, second, third = _coefficients(_squared(vector))
+    _, second, third, *_ = _coefficients(_squared(vector))
     return _quadratic(skew(vector), second, third)
 
 
@@ -237,25 +244,13 @@ def left_slope_change(
     vector: Float[Array, " 3"], constant_vector: Float[Array, " 3"]
 ) -> Float[Array, "3 3"]:
     """Differentiate `left_slope(vector).T @ constant_vector` by the rotation vector."""
-    # With w the constant vector the product is w - b (v x w) + c v x (v x w). The coefficients are
-    # functions of s = |v|^2 as a = sin(|v|) / |v| is: db/ds = (a - 2 b) / 2 s, dc/ds = (b - 3 c) /
-    # 2 s. Near zero the derivatives of their series are exact.
-    squared = _squared(vector)
-    coefficients = _coefficients(squared)
-    _, second, third = coefficients
-    small = squared < 1.0
-    near, far = jnp.where(small, squared, 0.0), jnp.where(small, 1.0, squared)
-    by_second, by_third = (
-        jnp.where(
-            small,
-            polynomial(polyder(_SERIES[k]).tolist(), near),
-            0.5 * (coefficients[k - 1] - (k + 1) * coefficients[k]) / far,
-        )
-        for k in (1, 2)
-    )
+    # With w the constant vector the product is w - b (v x w) + c v x (v x w), where b to e are
+    # the last four coefficients, and d - c / 2 and (3 e - d) / 2 the slopes of b and c by |v|^2.
+    _, second, third, fourth, fifth = _coefficients(_squared(vector))
+    by_second, by_third = 2.0 * fourth - third, 3.0 * fifth - fourth
     once = cross(vector, constant_vector)
     twice = cross(vector, once)
-    of_coefficients = jnp.outer(2.0 * (by_third * twice - by_second * once), vector)
+    of_coefficients = jnp.outer(by_third * twice - by_second * once, vector)
     of_products = skew(once) + skew(vector) @ skew(constant_vector)
     return of_coefficients + second * skew(constant_vector) - third * of_products
 

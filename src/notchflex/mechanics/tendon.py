@@ -184,7 +184,7 @@ class Straight(TendonGroup):
         def span(anchor: Motion, leaves: Array, enters: Array, channel: Array, left: Any) -> Any:
             reach = enters - anchor.point_inside(leaves)
             length = guarded_norm(reach)
-            gap = reach / jnp.where(length == 0.0, 1.0, length)
+            gap = reach * (1.0 / jnp.where(length == 0.0, 1.0, length))
             before = (channel if left is None else left) @ anchor.rotation
             onward = channel
             if chord is not None:

@@ -412,7 +412,7 @@ def linearise(jacobians: StateJacobians) -> LinearisedRows:
     chain, unit = jacobians.chain, jacobians.unit
     tendons = jacobians.tendons
     balance, to_previous = _balance_rows(jacobians)
-    residual = [balance / chain.stiffness[..., None], *_contact_rows(jacobians)]
+    residual = [balance * (1.0 / chain.stiffness)[..., None], *_contact_rows(jacobians)]
     residual += [_friction_rows(jacobians, k) for k in range(len(tendons))]
     to_next = [-unit.spread(motion) for motion in jacobians.relative[: len(unit.older)]]
     to_next += [jacobians.turn] if len(unit.turn) else []
@@ -511,13 +511,13 @@ def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
         before = jnp.broadcast_to(jacobians.unit.tension[k][None], tendon.gap_tension.shape)
         rows = jnp.stack([before, tendon.gap_tension], axis=2)
         limit = limit + slope(still, still + 1.0)[..., None] * rows
-    height = notch_heights(chain)[:, None, None, None]
+    per_height = (1.0 / notch_heights(chain))[:, None, None, None]
     # A contact that sticks hands on all that its neighbours cannot hold, so that sliding would
     # advance by one contact in a step. Far from the solution it therefore yields in the slopes; as
     # it yields by the square of the imbalance, convergence stays quadratic.
     imbalance = jacobians.evaluation.friction_imbalance
     compliance = jacobians.memory.slip_per_log_ratio(chain, group)[..., None] + imbalance**2
-    stuck = -AUGMENTATION * (tendon.at_edges / height - compliance * tendon.log_ratio[None])
+    stuck = -AUGMENTATION * (per_height * tendon.at_edges - compliance * tendon.log_ratio[None])
     value, bound = trial_log_ratio(chain, log_ratio, span.slid, jacobians.memory, k), span.bound
     upper, lower = (value >= bound)[..., None], (value <= -bound)[..., None]
     slides = tendon.log_ratio[None] - jnp.where(upper, limit, -limit)

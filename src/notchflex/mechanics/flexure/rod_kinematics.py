@@ -15,6 +15,7 @@ import operator
 from itertools import accumulate
 from typing import Any, NamedTuple
 
+import numpy as np
 from jaxtyping import Array, Float
 
 from notchflex._arrays import xp
@@ -31,6 +32,7 @@ from notchflex.mechanics.motion import (
     moment_of,
     rotation_about,
     unskew,
+    wrench_turn,
 )
 
 
@@ -95,7 +97,7 @@ def rotation_error_estimate(rod: Rod, modes: Modes) -> Float[Array, ""]:
     second = jnp.linalg.norm(_by_pair(rod, hat) @ hat, axis=-1)
     step = jnp.linalg.norm(turns[1:] - turns[:-1], axis=-1)
     change = jnp.maximum(jnp.pad(step, (1, 0)), jnp.pad(step, (0, 1)))
-    return jnp.sum((change / 20.0 + jnp.sum(turns**2, axis=-1) / 60.0) * second)
+    return jnp.sum((3.0 * change + jnp.sum(turns**2, axis=-1)) * second) / 60.0
 
 
 def rotations_before(values: Float[Array, "places 3 3"]) -> Float[Array, "places 3 3"]:
@@ -251,9 +253,19 @@ def _geometric_in_space(
     inside = jnp.einsum("kdc,kd->kc", rotations_before(state.rotation), beyond)
     change = change + jax.vmap(left_slope_change)(turns, inside) @ slope
     answers = jnp.einsum("kdc,kd->kc", by_turns, beyond)
-    pairs = jnp.einsum("kcij,kc->ij", rod.turn_pair[..., 1:, 1:], answers)
-    by_step = jnp.einsum("gci,gcj->ij", arms, turned)
-    return jnp.einsum("kci,kcj->ij", slope, change) + 2.0 * pairs - by_step
+    later, sooner = np.tril_indices(turned.shape[-1])
+    own = jnp.einsum("kcp,kcp->p", slope[..., later], change[..., sooner])
+    own = own - jnp.einsum("kcp,kcp->p", arms[..., later], turned[..., sooner])
+    pairs = rod.turn_pair[..., 1 + later, 1 + sooner]
+    own = own + 2.0 * jnp.einsum("kcp,kc->p", pairs, answers)
+    # Two modes in the other order differ by the bracket of the twists that they give the end.
+    twist = jnp.concatenate([state.turn[-1], end_displacement(state)])
+    change_of_wrench = wrench_turn(jnp.concatenate([moment, force])) @ twist
+    other = own + jnp.einsum("cp,cp->p", twist[:, sooner], change_of_wrench[:, later])
+    index = np.zeros((turned.shape[-1],) * 2, int)
+    index[sooner, later] = len(own) + np.arange(len(own))
+    index[later, sooner] = np.arange(len(own))
+    return jnp.concatenate([own, other])[index]
 
 
 class FlexureState(Pytree):
