@@ -24,9 +24,9 @@ from notchflex._jax import constant, jnp
 
 PLANE, IN_PLANE = slice(1, None, 2), slice(0, None, 2)
 
-# Series in a^2 of sin(a)/a, (1 - cos a)/a^2 and, of what follows (a - sin a)/a^3 in this row, the
-# two next. For angles of a quarter of a turn the first term left out is below 1e-16 of the first.
-_SERIES = [[(-1.0) ** k / factorial(2 * k + start) for k in range(9)] for start in (1, 2, 4, 5)]
+# Series of the last two of the `_coefficients` in a^2. For angles of a quarter of a turn the first
+# term left out is below 1e-16 of the first.
+_SERIES = [[(-1.0) ** k / factorial(2 * k + start) for k in range(9)] for start in (4, 5)]
 
 
 Vector = Float[Array, "d ..."]
@@ -148,15 +148,15 @@ def unskew(matrix: Matrix) -> Angular:
     )
 
 
-def _coefficients(squared: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], ...]:
-    """Compute sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 from a squared angle, and the two next.
+def _coefficients(vector: Float[Array, "*n a"]) -> tuple[Float[Array, "*n"], ...]:
+    """Compute sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 of a rotation by a, and the two next.
 
     Each is the first term of its series less a^2 times the one after the next.
     """
     # The last two of a quarter of the angle come from their series, and the angle is doubled twice:
     # up to a whole turn no digits are lost, and there is no case near zero.
-    squared = 0.0625 * squared
-    fourth, fifth = (polynomial(series, squared) for series in _SERIES[2:])
+    squared = 0.0625 * (vector * vector).sum(axis=-1)
+    fourth, fifth = (polynomial(series, squared) for series in _SERIES)
     first, second, third = _earlier(squared, fourth, fifth)
     for _ in range(2):
         fourth, fifth = 0.125 * third * (1.0 + first), 0.0625 * (fourth + fifth + second * third)
@@ -181,18 +181,13 @@ def polynomial(coefficients: Sequence[float], variable: Any) -> Any:
 
 def sine_cosine(angle: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Array, "*n"]]:
     """Compute sine and cosine to rounding accuracy."""
-    # In compiled code this is several times as fast as the scalar C library. The angle is reduced
-    # to half a turn, a quarter of it is put into the series, and the result is doubled twice.
+    # In compiled code the series are several times as fast as the scalar C library.
     if not is_traced(angle):
         return cast("tuple[Array, Array]", (xp.sin(angle), xp.cos(angle)))
     turn = 2.0 * np.pi
-    quarter = 0.25 * (angle - turn * jnp.round(angle / turn))
-    squared = quarter * quarter
-    sine = quarter * polynomial(_SERIES[0], squared)
-    versine = squared * polynomial(_SERIES[1], squared)
-    cosine = 1.0 - versine
-    sine, cosine = 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
-    return 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
+    angle = angle - turn * jnp.round(angle / turn)
+    first, second, *_ = _coefficients(angle[..., None])
+    return angle * first, 1.0 - angle * angle * second
 
 
 def wrench_at(point: Vector, force: Vector) -> Wrench:
@@ -230,13 +225,13 @@ def rotation_about(vector: Float[Array, "*n a"]) -> Matrix:
     if vector.shape[-1] == 1:
         sine, cosine = sine_cosine(vector[..., 0])
         return xp.stack([cosine, sine, -sine, cosine], -1).reshape(*vector.shape[:-1], 2, 2)
-    first, second, *_ = _coefficients(_squared(vector))
+    first, second, *_ = _coefficients(vector)
     return _quadratic(skew(vector), first, second)
 
 
 def left_slope(vector: Float[Array, "*n 3"]) -> Float[Array, "*n 3 3"]:
     """Return the left Jacobian of SO(3): rotation in the outer frame per change of its vector."""
-    _, second, third, *_ = _coefficients(_squared(vector))
+    _, second, third, *_ = _coefficients(vector)
     return _quadratic(skew(vector), second, third)
 
 
@@ -246,17 +241,13 @@ def left_slope_change(
     """Differentiate `left_slope(vector).T @ constant_vector` by the rotation vector."""
     # With w the constant vector the product is w - b (v x w) + c v x (v x w), where b to e are
     # the last four coefficients, and d - c / 2 and (3 e - d) / 2 the slopes of b and c by |v|^2.
-    _, second, third, fourth, fifth = _coefficients(_squared(vector))
+    _, second, third, fourth, fifth = _coefficients(vector)
     by_second, by_third = 2.0 * fourth - third, 3.0 * fifth - fourth
     once = cross(vector, constant_vector)
     twice = cross(vector, once)
     of_coefficients = jnp.outer(by_third * twice - by_second * once, vector)
     of_products = skew(once) + skew(vector) @ skew(constant_vector)
     return of_coefficients + second * skew(constant_vector) - third * of_products
-
-
-def _squared(vector: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
-    return (vector * vector).sum(axis=-1)
 
 
 def _quadratic(matrix: Matrix, linear: Float[Array, "*n"], square: Float[Array, "*n"]) -> Matrix:

@@ -18,7 +18,7 @@ from notchflex.mechanics.contact import ContactGroup
 from notchflex.mechanics.flexure import flexure_state, geometric_stiffness, material_tangent
 from notchflex.mechanics.flexure.rod import Rod
 from notchflex.mechanics.material import Law
-from notchflex.mechanics.motion import Motion, angular, skew, turned, wrench_turn
+from notchflex.mechanics.motion import Motion, angular, skew, turned, wrench_at, wrench_turn
 from notchflex.mechanics.tendon import TendonGroup
 from notchflex.solver.residual import (
     AUGMENTATION,
@@ -268,7 +268,9 @@ class StateJacobians:
             relative = select_back(self.relative, group.back)
             length.append(jnp.einsum("ntw,ntwz->ntz", slopes.length, relative))
             turning.append(jnp.einsum("ntsw,ntwz->ntsz", slopes.turning, relative))
-            wrench = jnp.einsum("ntvw,ntwz->ntvz", slopes.wrench, relative)
+            pulled = slopes.wrench[:, :, -group.enters.shape[-1] :]
+            pulled = jnp.einsum("ntvw,ntwz->ntvz", pulled, relative)
+            wrench = jax.vmap(jax.vmap(wrench_at))(group.enters, pulled)
         if group.by_modes:
             slopes = self._by_modes(group)
             if crossing.slope is not None:

@@ -219,9 +219,5 @@ def _by_wrench(
         free = free_end, jax.vmap(start.then)(Motion(rod.node_rotation, rod.node_offset))
         body, nodes = choose(is_small, free, (body, nodes))
 
-    def at_node(node: Motion) -> Array:
-        across = node.rotation.T @ body.rotation
-        offset = (body.translation - node.translation) @ node.rotation
-        return Motion(across, offset).wrench(wrench)
-
-    return jax.vmap(at_node)(nodes)
+    outside = body.wrench(wrench)
+    return jax.vmap(lambda node: node.wrench_inside(outside))(nodes)
