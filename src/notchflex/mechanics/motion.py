@@ -24,9 +24,9 @@ from notchflex._jax import constant, jnp
 
 PLANE, IN_PLANE = slice(1, None, 2), slice(0, None, 2)
 
-# Series of the last two of the `_coefficients` in a^2. For angles of a quarter of a turn the first
-# term left out is below 1e-16 of the first.
-_SERIES = [[(-1.0) ** k / factorial(2 * k + start) for k in range(9)] for start in (4, 5)]
+# Series in a^2 of sin(a)/a, (1 - cos a)/a^2 and the last two of the `_coefficients`. For a quarter
+# of a turn the first term left out is below 1e-16 of the first.
+_SERIES = [[(-1.0) ** k / factorial(2 * k + start) for k in range(9)] for start in (1, 2, 4, 5)]
 
 
 Vector = Float[Array, "d ..."]
@@ -148,27 +148,20 @@ def unskew(matrix: Matrix) -> Angular:
     )
 
 
-def _coefficients(vector: Float[Array, "*n a"]) -> tuple[Float[Array, "*n"], ...]:
-    """Compute sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 of a rotation by a, and the two next.
+def _coefficients(squared: Float[Array, "*n"], doublings: int = 2) -> list[Float[Array, "*n"]]:
+    """Compute sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 from a squared angle, and the two next.
 
     Each is the first term of its series less a^2 times the one after the next.
     """
     # The last two of a quarter of the angle come from their series, and the angle is doubled twice:
     # up to a whole turn no digits are lost, and there is no case near zero.
-    squared = 0.0625 * (vector * vector).sum(axis=-1)
-    fourth, fifth = (polynomial(series, squared) for series in _SERIES)
-    first, second, third = _earlier(squared, fourth, fifth)
-    for _ in range(2):
-        fourth, fifth = 0.125 * third * (1.0 + first), 0.0625 * (fourth + fifth + second * third)
-        squared = 4.0 * squared
-        first, second, third = _earlier(squared, fourth, fifth)
-    return first, second, third, fourth, fifth
-
-
-def _earlier(squared: Array, fourth: Array, fifth: Array) -> tuple[Array, Array, Array]:
-    """Compute the first three of the `_coefficients` from the two others."""
+    if doublings:
+        first, second, third, *last = _coefficients(0.25 * squared, doublings - 1)
+        fourth, fifth = 0.125 * third * (1.0 + first), 0.0625 * (sum(last) + second * third)
+    else:
+        fourth, fifth = (polynomial(series, squared) for series in _SERIES[2:])
     third = 1.0 / 6.0 - squared * fifth
-    return 1.0 - squared * third, 0.5 - squared * fourth, third
+    return [1.0 - squared * third, 0.5 - squared * fourth, third, fourth, fifth]
 
 
 def polynomial(coefficients: Sequence[float], variable: Any) -> Any:
@@ -181,13 +174,18 @@ def polynomial(coefficients: Sequence[float], variable: Any) -> Any:
 
 def sine_cosine(angle: Float[Array, "*n"]) -> tuple[Float[Array, "*n"], Float[Array, "*n"]]:
     """Compute sine and cosine to rounding accuracy."""
-    # In compiled code the series are several times as fast as the scalar C library.
+    # In compiled code this is several times as fast as the scalar C library. The angle is reduced
+    # to half a turn, a quarter of it is put into the series, and the result is doubled twice.
     if not is_traced(angle):
         return cast("tuple[Array, Array]", (xp.sin(angle), xp.cos(angle)))
     turn = 2.0 * np.pi
-    angle = angle - turn * jnp.round(angle / turn)
-    first, second, *_ = _coefficients(angle[..., None])
-    return angle * first, 1.0 - angle * angle * second
+    quarter = 0.25 * (angle - turn * jnp.round(angle / turn))
+    squared = quarter * quarter
+    sine = quarter * polynomial(_SERIES[0], squared)
+    versine = squared * polynomial(_SERIES[1], squared)
+    cosine = 1.0 - versine
+    sine, cosine = 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
+    return 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
 
 
 def wrench_at(point: Vector, force: Vector) -> Wrench:
@@ -225,13 +223,13 @@ def rotation_about(vector: Float[Array, "*n a"]) -> Matrix:
     if vector.shape[-1] == 1:
         sine, cosine = sine_cosine(vector[..., 0])
         return xp.stack([cosine, sine, -sine, cosine], -1).reshape(*vector.shape[:-1], 2, 2)
-    first, second, *_ = _coefficients(vector)
+    first, second, *_ = _coefficients((vector * vector).sum(axis=-1))
     return _quadratic(skew(vector), first, second)
 
 
 def left_slope(vector: Float[Array, "*n 3"]) -> Float[Array, "*n 3 3"]:
     """Return the left Jacobian of SO(3): rotation in the outer frame per change of its vector."""
-    _, second, third, *_ = _coefficients(vector)
+    _, second, third, *_ = _coefficients((vector * vector).sum(axis=-1))
     return _quadratic(skew(vector), second, third)
 
 
@@ -241,7 +239,7 @@ def left_slope_change(
     """Differentiate `left_slope(vector).T @ constant_vector` by the rotation vector."""
     # With w the constant vector the product is w - b (v x w) + c v x (v x w), where b to e are
     # the last four coefficients, and d - c / 2 and (3 e - d) / 2 the slopes of b and c by |v|^2.
-    _, second, third, fourth, fifth = _coefficients(vector)
+    _, second, third, fourth, fifth = _coefficients((vector * vector).sum(axis=-1))
     by_second, by_third = 2.0 * fourth - third, 3.0 * fifth - fourth
     once = cross(vector, constant_vector)
     twice = cross(vector, once)
