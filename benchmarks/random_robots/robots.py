@@ -11,11 +11,12 @@ Loads go up to the range of the model. A notch that closes bears any tension in 
 up to three times what closes half of the notches, and now and then far beyond. Nothing stops gaps,
 tables, an arc notch that a tendon opens, and out of the plane a notch that is bent to its side.
 There tendons together pull no more than what bends the softest gap or table to its range, would
-close the softest notch that is opened, lets the softest U-link yield, or three times what closes
-the softest notch of other kinds; they press on no gap so that it buckles; and they draw no more
-than such tensions do. All loads from outside together, weight among them, have at most the moment
-that closes the softest notch, bends the softest gap or table to its range, or twists an arc notch
-by half a radian, and do not buckle the robot.
+close the softest notch that is opened, or three times what closes the softest notch. Nowhere they
+pull more than what lets the softest strip yield, or press on a gap so that it buckles, or on a
+strip so that its notch half closes; and they draw no more than such tensions do. All loads from
+outside together, weight among them, have at most the moment that closes the softest notch, bends
+the softest gap or table to its range, or twists an arc notch by half a radian, and do not buckle
+the robot.
 """
 
 from __future__ import annotations
@@ -48,6 +49,8 @@ ROUND = {"arc", "rod", "table"}  # kinds over which a tendon may lie on any side
 # tendons together may press on a gap, times its length over its stiffness: hinged at both ends it
 # would buckle at pi**2, and bends to its side before.
 _SIDEWAYS, _UPRIGHT = 3.0, 3.0
+# What part of the width of a notch all tendons together may close by pressing alone.
+_PRESSED = 0.5
 # What loads from outside may press on a robot, times its length over its stiffness.
 _COLUMN = 2.0
 # How far loads from outside may twist an arc notch, rad.
@@ -328,13 +331,26 @@ def most_tension(robot: Table, planar: bool) -> float:
         stiff, angle, lever = reference(robot, notch)
         opened = min(toward(notch, tendon) for tendon in robot["tendon"]) < -1e-9
         freely = notch["kind"] in ("rod", "table") or (notch["kind"] == "arc" and opened)
-        # Where only a part of a link yields, its few modes miss the moment.
-        links = notch["kind"] == "u-link" and yields(robot, notch)
-        times = 1.0 if freely else math.inf if planar else 1.0 if links else _SIDEWAYS
+        # Where only a part of a strip yields, its few modes miss the moment.
+        crosses = notch["kind"] in ("strip", "u-link")
+        freely = freely or (crosses and yields(robot, notch))
+        times = 1.0 if freely else math.inf if planar else _SIDEWAYS
         most.append(times * stiff * angle / lever / together)
+        if crosses:  # its ends move past each other, by 12 EI / L**3, until the tendon's edges meet
+            length = strip_length(notch, notch.get("tube", robot["tube"]))
+            width = notch.get("height") or 2 * notch["slot_radius"]
+            most.append(_PRESSED * 12.0 * stiff * width / length**2 / len(sides))
         if notch["kind"] in ("rod", "table"):
             most.append(_UPRIGHT * stiff / notch["length"] / len(sides))
     return float(min(most))
+
+
+def strip_length(notch: Table, tube: Table) -> float:
+    """Return the length of what bends in a notch of kind strip or u-link, mm."""
+    if notch["kind"] == "strip":
+        across = (tube["outer_diameter"] + tube["inner_diameter"]) / 2
+        return notch.get("strip_length") or across
+    return notch["strip_length"] + 2 * notch["slot_radius"]
 
 
 def yields(robot: Table, notch: Table) -> bool:
@@ -400,12 +416,12 @@ def reference(robot: Table, notch: Table) -> tuple[float, float, float]:
     if notch["kind"] == "table":
         if "moment" in notch:
             angle = math.radians(notch["angle_deg"][-1])
-            stiffness = notch["moment"][-1] / angle
+            stiffness = min(notch["moment"][-1], -notch["moment"][0]) / angle
         else:
             angle, known = 0.4, notch["stiffness"]
             stiffness = known[7 if len(known) == 36 else 1]
         angle = min(angle, math.radians(notch.get("closing_angle_deg", 60.0)))
-        lever = outer * 0.8 + max(notch.get("axis_offset", 0.0), 0.0)
+        lever = outer * 0.8 + abs(notch.get("axis_offset", 0.0))
         # A tendon has no length left where the edges of its channel meet.
         return stiffness, 0.7 * min(angle, notch["length"] / lever), lever
     if notch["kind"] == "rod":
@@ -420,13 +436,12 @@ def reference(robot: Table, notch: Table) -> tuple[float, float, float]:
     else:
         fibre = notch["strip_thickness"] / 2
         second = (notch.get("wall_width") or 2 * (outer - inner)) * 2 * fibre**3 / 3
+        length = strip_length(notch, tube)
         if notch["kind"] == "strip":
-            length = notch.get("strip_length") or outer + inner
             angle, lever = min(notch["height"] / (2 * outer), 0.5), 0.5 * length
         else:
-            length = notch["strip_length"] + 2 * notch["slot_radius"]
             angle, lever = min(notch["slot_radius"] / outer, 0.3), 0.8 * outer
-            angle = min(angle, 0.9 * kink(material)[0] * length / fibre)
+        angle = min(angle, 0.9 * kink(material)[0] * length / fibre)
     modulus = elastic_modulus(material) * softened(material, angle * fibre / length)
     return modulus * second / length, angle, lever
 
