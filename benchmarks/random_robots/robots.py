@@ -415,8 +415,9 @@ def reference(robot: Table, notch: Table) -> tuple[float, float, float]:
     outer, inner = tube["outer_diameter"] / 2, tube["inner_diameter"] / 2
     if notch["kind"] == "table":
         if "moment" in notch:
-            angle = math.radians(notch["angle_deg"][-1])
-            stiffness = min(notch["moment"][-1], -notch["moment"][0]) / angle
+            angles, moments = np.radians(notch["angle_deg"]), notch["moment"]
+            angle = float(angles[-1])
+            stiffness = min(moments[end] / angles[end] for end in (0, -1) if moments[end])
         else:
             angle, known = 0.4, notch["stiffness"]
             stiffness = known[7 if len(known) == 36 else 1]
