@@ -55,7 +55,7 @@ def test_base_turned(vector, margin):
     margin.within("body rotations", state.body_rotation - turned, EXACT)
 
 
-@pytest.mark.parametrize("by_deg", [90.0, 123.4])
+@pytest.mark.parametrize("by_deg", [90.0, 123.4, -3210.0])
 def test_notches_and_tendons_turned(by_deg, margin):
     by = np.radians(by_deg)
     reference = nf.solve(robot_turned(0.0), nf.Load(tension=TENSION))

@@ -24,8 +24,8 @@ from notchflex._jax import constant, jnp
 
 PLANE, IN_PLANE = slice(1, None, 2), slice(0, None, 2)
 
-# Series in a^2 of sin(a)/a, (1 - cos a)/a^2 and the last two of the `_coefficients`. For a quarter
-# of a turn the first term left out is below 1e-16 of the first.
+# Series in a^2 of sin(a)/a, (1 - cos a)/a^2 and the last two of the `_coefficients`: the first term
+# left out is below 1e-16 of the first to an eighth of a turn, of the last two to a quarter.
 _SERIES = [[(-1.0) ** k / factorial(2 * k + start) for k in range(9)] for start in (1, 2, 4, 5)]
 
 

@@ -254,18 +254,18 @@ def _geometric_in_space(
     change = change + jax.vmap(left_slope_change)(turns, inside) @ slope
     answers = jnp.einsum("kdc,kd->kc", by_turns, beyond)
     later, sooner = np.tril_indices(turned.shape[-1])
-    own = jnp.einsum("kcp,kcp->p", slope[..., later], change[..., sooner])
-    own = own - jnp.einsum("kcp,kcp->p", arms[..., later], turned[..., sooner])
+    lower = jnp.einsum("kcp,kcp->p", slope[..., later], change[..., sooner])
+    lower = lower - jnp.einsum("kcp,kcp->p", arms[..., later], turned[..., sooner])
     pairs = rod.turn_pair[..., 1 + later, 1 + sooner]
-    own = own + 2.0 * jnp.einsum("kcp,kc->p", pairs, answers)
+    lower = lower + 2.0 * jnp.einsum("kcp,kc->p", pairs, answers)
     # Two modes in the other order differ by the bracket of the twists that they give the end.
     twist = jnp.concatenate([state.turn[-1], end_displacement(state)])
     change_of_wrench = wrench_turn(jnp.concatenate([moment, force])) @ twist
-    other = own + jnp.einsum("cp,cp->p", twist[:, sooner], change_of_wrench[:, later])
+    upper = lower + jnp.einsum("cp,cp->p", twist[:, sooner], change_of_wrench[:, later])
     index = np.zeros((turned.shape[-1],) * 2, int)
-    index[sooner, later] = len(own) + np.arange(len(own))
-    index[later, sooner] = np.arange(len(own))
-    return jnp.concatenate([own, other])[index]
+    index[sooner, later] = len(lower) + np.arange(len(lower))
+    index[later, sooner] = np.arange(len(lower))
+    return jnp.concatenate([lower, upper])[index]
 
 
 class FlexureState(Pytree):
