@@ -261,7 +261,8 @@ class StateJacobians:
 
     def _crossing(self, k: int) -> tuple[Any, Any, Array | None]:
         """Compute short rows of span length, turning angles and wrench of the k-th group."""
-        group, crossing = self.chain.groups[k], self.evaluation.spans[k].crossing
+        group: Any = self.chain.groups[k]
+        crossing = self.evaluation.spans[k].crossing
         length, turning, wrench = [], [], None
         if group.acts_on_bodies:
             slopes = self._by_relative_motion(group, type(group).cross)

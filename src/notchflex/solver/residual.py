@@ -418,7 +418,7 @@ def evaluate(
         ratio - clip_symmetric(trial_log_ratio(chain, ratio, span.slid, memory, k), span.bound)
         for k, (ratio, span) in enumerate(zip(unknowns.log_ratio, spans, strict=True))
     )
-    # One division costs as much as ten products; this one does not depend on the unknowns.
+    # The inverse does not depend on the unknowns.
     residual = Unknowns(balance * (1.0 / chain.stiffness), contact_force, log_ratio)
     base = BaseReaction(
         point.base_tension,
