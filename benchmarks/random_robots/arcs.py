@@ -328,6 +328,7 @@ def bending(
     own, soft = whole - warped * reduced, soft + warped * reduced / rigidity
     if isinstance(material, nf.Superelastic):
         problems: list[str] = []
+        memory = None  # that of a notch of another material
 
         def moment(curvature: np.ndarray) -> np.ndarray:
             return second / spine * stress(material, curvature * spine)
