@@ -240,10 +240,10 @@ def left_slope_change(
     # With w the constant vector the product is w - b (v x w) + c v x (v x w), where b to e are
     # the last four coefficients, and d - c / 2 and (3 e - d) / 2 the slopes of b and c by |v|^2.
     _, second, third, fourth, fifth = _coefficients((vector * vector).sum(axis=-1))
-    by_second, by_third = 2.0 * fourth - third, 3.0 * fifth - fourth
     once = cross(vector, constant_vector)
     twice = cross(vector, once)
-    of_coefficients = jnp.outer(by_third * twice - by_second * once, vector)
+    of_third = (3.0 * fifth - fourth) * twice
+    of_coefficients = jnp.outer(of_third - (2.0 * fourth - third) * once, vector)
     of_products = skew(once) + skew(vector) @ skew(constant_vector)
     return of_coefficients + second * skew(constant_vector) - third * of_products
 
