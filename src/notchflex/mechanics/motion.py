@@ -242,8 +242,9 @@ def left_slope_change(
     _, second, third, fourth, fifth = _coefficients((vector * vector).sum(axis=-1))
     once = cross(vector, constant_vector)
     twice = cross(vector, once)
-    of_third = (3.0 * fifth - fourth) * twice
-    of_coefficients = jnp.outer(of_third - (2.0 * fourth - third) * once, vector)
+    of_coefficients = jnp.outer(
+        (3.0 * fifth - fourth) * twice - (2.0 * fourth - third) * once, vector
+    )
     of_products = skew(once) + skew(vector) @ skew(constant_vector)
     return of_coefficients + second * skew(constant_vector) - third * of_products
 
