@@ -67,19 +67,16 @@ def jumps(path: nf.EquilibriumPath, step: int, steps: int = 400) -> np.ndarray:
     return ((change > 0.5) & (change > 0.5 * most)).any(axis=0)
 
 
-def test_snaps_are_the_jumps_that_finer_steps_leave():
-    alike = []
-    for friction in (0.05, 0.1, 0.2, 0.3, 0.4):
-        path = nf.simulate(wrist(friction), nf.pull(0.0, 3.0, steps=25).release())
-        change = np.abs(np.diff(np.degrees(path.notch_angle), axis=0))
-        assert not (path.snap[1:][change < 1.0]).any()
-        for step in 1 + np.flatnonzero(change.max(axis=1) > 3.0):
-            alike.append(((path.snap[step] != 0) == jumps(path, step)).all())
-        assert (path.snap[:25] >= 0).all()
-        assert (path.snap[25:] <= 0).all()
-    # A step in which several notches snap may end elsewhere than finer ones (docs/limits.md).
-    assert len(alike) > 40
-    assert np.mean(alike) > 0.9
+@pytest.mark.parametrize("friction", [0.05, 0.3])
+def test_snaps_are_the_jumps_that_finer_steps_leave(friction):
+    path = nf.simulate(wrist(friction), nf.pull(0.0, 3.0, steps=25).release())
+    change = np.abs(np.diff(np.degrees(path.notch_angle), axis=0))
+    assert not (path.snap[1:][change < 1.0]).any()
+    for step in 1 + np.flatnonzero(change.max(axis=1) > 3.0):
+        np.testing.assert_array_equal(path.snap[step] != 0, jumps(path, step), str(step))
+    assert (path.snap[:25] >= 0).all()
+    assert (path.snap[25:] <= 0).all()
+    assert path.snap.any()
 
 
 def test_a_snap_just_before_closing_is_counted():

@@ -600,6 +600,7 @@ def _template(
     free = jax.tree.map(lambda *leaves: xp.stack(leaves)[rod_index], *free_poses)
     free = Motion(free.rotation, free.translation + lead)
     sides = dict.fromkeys(notch.direction_deg for notch in notches)
+    # The series of a rotation holds for a turn or two.
     turns = {side: rotation_about(constant(TUBE_AXIS * xp.radians(side % 360))) for side in sides}
     # The squared motion of a notch's contact by its modes is over the stiffness a flexibility. A
     # contact opposite a spine moves with its fibre; an edge contact by its distance from the tube

@@ -418,8 +418,7 @@ def evaluate(
         ratio - clip_symmetric(trial_log_ratio(chain, ratio, span.slid, memory, k), span.bound)
         for k, (ratio, span) in enumerate(zip(unknowns.log_ratio, spans, strict=True))
     )
-    # The inverse does not depend on the unknowns.
-    residual = Unknowns(balance * (1.0 / chain.stiffness), contact_force, log_ratio)
+    residual = Unknowns(balance / chain.stiffness, contact_force, log_ratio)
     base = BaseReaction(
         point.base_tension,
         in_tendon_order(chain, tuple(span.released_length[0] for span in spans)),
