@@ -53,14 +53,15 @@ def test_it_is_said(cycle):
     assert "prescribe the stroke" in shut
 
 
-def jumps(path: nf.EquilibriumPath, step: int, steps: int = 400) -> np.ndarray:
-    """Notches whose angle still changes at once when a step is taken in so many."""
+def in_fine_steps(path: nf.EquilibriumPath, step: int, steps: int = 400) -> nf.EquilibriumPath:
+    """Return one step of a path, taken in so many."""
     way = np.linspace(path.tension[step - 1], path.tension[step], steps + 1)
-    fine = nf.simulate(
-        path.robot,
-        [nf.Load(tension=one) for one in way.tolist()],
-        from_state=path.state_at(step - 1),
-    )
+    loads = [nf.Load(tension=tension) for tension in way.tolist()]
+    return nf.simulate(path.robot, loads, from_state=path.state_at(step - 1))
+
+
+def jumps(fine: nf.EquilibriumPath) -> np.ndarray:
+    """Notches whose angle changes at once even in fine steps."""
     change = np.abs(np.diff(np.degrees(fine.notch_angle), axis=0))
     # As one snaps, the friction on it changes, and so do the others a little.
     most = change.max(axis=1, keepdims=True)
@@ -72,8 +73,17 @@ def test_snaps_are_the_jumps_that_finer_steps_leave(friction):
     path = nf.simulate(wrist(friction), nf.pull(0.0, 3.0, steps=25).release())
     change = np.abs(np.diff(np.degrees(path.notch_angle), axis=0))
     assert not (path.snap[1:][change < 1.0]).any()
+    elsewhere = 0
     for step in 1 + np.flatnonzero(change.max(axis=1) > 3.0):
-        np.testing.assert_array_equal(path.snap[step] != 0, jumps(path, step), str(step))
+        fine = in_fine_steps(path, step)
+        off = np.degrees(fine.notch_angle[-1] - path.notch_angle[step])
+        # Where several notches are about to snap, it may be one more in a coarse step
+        # (docs/limits.md); rounding decides at which friction.
+        if np.abs(off).max() > 1.0:
+            elsewhere += 1
+        else:
+            np.testing.assert_array_equal(path.snap[step] != 0, jumps(fine), str(step))
+    assert elsewhere <= 1
     assert (path.snap[:25] >= 0).all()
     assert (path.snap[25:] <= 0).all()
     assert path.snap.any()
@@ -85,7 +95,7 @@ def test_a_snap_just_before_closing_is_counted():
     loads = [nf.Load(tension=one) for one in (0.6, 1.2, 1.8)]
     path = nf.simulate(robot, loads)
     np.testing.assert_array_equal(path.snap, [[0] * 5, [0] * 5, [1, 0, 0, 0, 0]])
-    assert jumps(path, 2)[0]
+    assert jumps(in_fine_steps(path, 2))[0]
 
 
 @pytest.mark.nightly
