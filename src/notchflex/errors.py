@@ -34,7 +34,7 @@ class Failure(_Coded):
     BENT_TOO_FAR = (
         "a notch is bent by more than half a turn, so sharply that a fibre would have no length "
         "left, beyond the ends of its table, or too far about several axes at once",
-        "take smaller loads",
+        "take smaller loads or, where it bends about several axes, a refinement of 1, 2 or 3",
     )
     TOO_FEW_MODES = (
         "the strain modes miss the moment of the loads by {percent:.0f} % of the largest: the "
