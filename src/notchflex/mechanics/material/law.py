@@ -44,7 +44,7 @@ def bracketed_root(
 ) -> Array:
     """Find the root of a rising function by Newton's method with bisection."""
     # The function of `varied` and the unknown returns its value and slope. Only a last Newton step
-    # is differentiated. A bilinear law takes three of the 20 steps, a plastic branch one more.
+    # is differentiated. A bilinear law takes three of the 20 steps, a plastic branch up to 19.
     fixed, bracket = jax.tree.map(
         jax.lax.stop_gradient, (varied, (start, low, high, 2.0 * (high - low)))
     )
@@ -56,14 +56,15 @@ def bracketed_root(
         high = jnp.where(value >= 0.0, root, high)
         step = -value / slope
         new = root + step
-        newton_step = (new >= low) & (new <= high) & (jnp.abs(step) <= 0.5 * last_step)
-        new = jnp.where(newton_step, new, 0.5 * (low + high))
+        # At the root a step is rounding, and may be longer than the last one.
+        falls = jnp.abs(step) <= 0.5 * last_step + 1e-12 * jnp.abs(root)
+        new = jnp.where(falls & (new >= low) & (new <= high), new, 0.5 * (low + high))
         return new, low, high, jnp.abs(new - root)
 
     root = jax.lax.fori_loop(0, 20, improve, bracket)[0]
     value, slope = beyond(*varied, root)
     slope = jax.lax.stop_gradient(slope)
-    return root - jnp.where(slope > 1e-9, value / jnp.where(slope > 1e-9, slope, 1.0), 0.0)
+    return root - jnp.where(slope > 1e-9, value, 0.0) / jnp.maximum(slope, 1e-9)
 
 
 class SectionEnds(NamedTuple):
