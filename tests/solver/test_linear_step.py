@@ -65,7 +65,7 @@ def test_it_is_the_dense_step(case: str, margin) -> None:
         largest = jnp.max(jnp.abs(ravel_pytree(found.residual.log_ratio)[0]))
         ratios = point.unknowns.log_ratio
         sticks = tuple(
-            jnp.abs(trial_log_ratio(ready.chain, ratios[k], span.slid, rest.memory, k)) < span.bound
+            jnp.abs(trial_log_ratio(ready.chain, ratios[k], span, rest.memory, k)) < span.bound
             for k, span in enumerate(found.spans)
         )
         nothing = jax.tree.map(jnp.zeros_like, point)

@@ -495,7 +495,7 @@ def _contact_rows(jacobians: StateJacobians) -> list[Array]:
 def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     """Compute the rows of the friction law at both edges, for the k-th group."""
     chain, span, tendon = jacobians.chain, jacobians.evaluation.spans[k], jacobians.tendons[k]
-    log_ratio, group = jacobians.unknowns.log_ratio[k], jacobians.chain.groups[k]
+    log_ratio, group = jacobians.unknowns.log_ratio[k], chain.groups[k]
     crossing, offset = span.crossing, chain.friction.offset()
     tension_before = (span.gap_tension + offset) / span.tension_ratio[..., 0] - offset
     tension = jnp.stack([tension_before, span.gap_tension], axis=-1)
@@ -504,8 +504,8 @@ def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     def slope(turning_change: Array, tension_change: Array) -> Array:
         """Differentiate the limits by turning angles and tensions, where contacts can slide."""
         limits = partial(chain.friction.limits, log_ratio=log_ratio)
-        primals, tangents = (crossing.turning, tension), (turning_change, tension_change)
-        return slip_mask(group) * jax.jvp(limits, primals, tangents)[1]
+        changes = turning_change, tension_change
+        return slip_mask(group) * jax.jvp(limits, (crossing.turning, tension), changes)[1]
 
     # Edges, then the turning angles that they depend on.
     by_turning = jnp.stack([slope(still + unit[None, None], still) for unit in jnp.eye(2)], -1)
@@ -518,13 +518,13 @@ def _friction_rows(jacobians: StateJacobians, k: int) -> Float[Array, "n 2t z"]:
     # A contact that sticks hands on all that its neighbours cannot hold, so that sliding would
     # advance by one contact in a step. Far from the solution it therefore yields in the slopes; as
     # it yields by the square of the imbalance, convergence stays quadratic.
-    imbalance = jacobians.evaluation.friction_imbalance
-    compliance = jacobians.memory.slip_per_log_ratio(chain, group)[..., None] + imbalance**2
+    compliance = jacobians.memory.slip_per_log_ratio(chain, group, span)[..., None]
+    compliance = compliance + jacobians.evaluation.friction_imbalance**2
     stuck = -AUGMENTATION * (per_height * tendon.at_edges - compliance * tendon.log_ratio[None])
-    value, bound = trial_log_ratio(chain, log_ratio, span.slid, jacobians.memory, k), span.bound
-    upper, lower = (value >= bound)[..., None], (value <= -bound)[..., None]
+    value, bound = trial_log_ratio(chain, log_ratio, span, jacobians.memory, k), span.bound
+    upper = (value >= bound)[..., None]
     slides = tendon.log_ratio[None] - jnp.where(upper, limit, -limit)
-    rows = jnp.where(upper | lower, slides, stuck)
+    rows = jnp.where((jnp.abs(value) >= bound)[..., None], slides, stuck)
     return rows.reshape(chain.flexures, -1, rows.shape[-1])
 
 

@@ -142,17 +142,17 @@ def in_tendon_order(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...])
 # Each law is written as one equation that Newton's method solves together with the equilibrium.
 
 # Friction law: x = clip(x + r (slip - c (x - x_prev))). The augmentation parameter r only affects
-# convergence and drops out at the solution; the compliance c of sticking contacts keeps the law
-# regular where a slack tendon leaves the tension ratio undefined. Slip is in heights of the notch,
-# so that a scaled robot is solved in the same way. The compliance is well above the rounding of a
-# slip (1e-16): below, the ratios of a slack tendon are noise, and a reversed stroke took 40
-# iterations instead of 14 (tests/solver/test_antagonists.py).
+# convergence and drops out at the solution. Slip is in heights of the notch, so that a scaled robot
+# is solved in the same way. The compliance c of sticking contacts keeps the law regular:
 #
 # Two contacts at one place, such as both edges of a disk without thickness, share what they hold in
 # any way while they stick. On a tendon that stretches they are found with a compliance that is this
-# part of the stretch by the closing force (tests/solver/test_many_strokes.py).
+# part of the stretch by the closing force (tests/solver/test_many_strokes.py). The ratios of a
+# slack tendon change nothing, and it counts as one that stretches by a height: with a compliance
+# near the rounding of a slip its ratios were noise, and a reversed stroke took 40 iterations
+# instead of 16 (tests/solver/test_antagonists.py).
 AUGMENTATION = 8.0
-_MIN_STICK_COMPLIANCE, _STICK_STRETCH = 1e-12, 1e-9
+_STICK_STRETCH = 1e-9
 
 
 class Unknowns(NamedTuple):
@@ -205,10 +205,12 @@ class Memory(NamedTuple):
     stick_compliance: Float[Array, ""] | None = None
     sheath: SheathMemory | None = None
 
-    def slip_per_log_ratio(self, chain: Chain, group: TendonGroup) -> Float[Array, "1 t 1"]:
+    def slip_per_log_ratio(
+        self, chain: Chain, group: TendonGroup, span: TendonSpans
+    ) -> Float[Array, "n t 1"]:
         """Slip over a sticking contact per change of its log ratio, in heights of the notch."""
         stretch = chain.closing_force / of_group(chain.axial_stiffness, group)[None, :, None]
-        least = _MIN_STICK_COMPLIANCE + _STICK_STRETCH * stretch
+        least = _STICK_STRETCH * (stretch + (span.gap_tension[..., None] <= 0.0))
         return least if self.stick_compliance is None else least + self.stick_compliance
 
 
@@ -220,13 +222,13 @@ def notch_heights(chain: Chain) -> Float[Array, " n"]:
 def trial_log_ratio(
     chain: Chain,
     log_ratio: Float[Array, "n t 2"],
-    slid: Float[Array, "n t 2"],
+    span: TendonSpans,
     memory: Memory,
     k: int,
 ) -> Float[Array, "n t 2"]:
     """Compute the trial log ratios of the k-th group from the slip, before they are clipped."""
-    slip = (slid - memory.slid[k]) / notch_heights(chain)[:, None, None]
-    compliance = memory.slip_per_log_ratio(chain, chain.groups[k])
+    slip = (span.slid - memory.slid[k]) / notch_heights(chain)[:, None, None]
+    compliance = memory.slip_per_log_ratio(chain, chain.groups[k], span)
     return log_ratio + AUGMENTATION * (slip - compliance * (log_ratio - memory.log_ratio[k]))
 
 
@@ -417,7 +419,7 @@ def evaluate(
         )
     )
     log_ratio = tuple(
-        ratio - clip_symmetric(trial_log_ratio(chain, ratio, span.slid, memory, k), span.bound)
+        ratio - clip_symmetric(trial_log_ratio(chain, ratio, span, memory, k), span.bound)
         for k, (ratio, span) in enumerate(zip(unknowns.log_ratio, spans, strict=True))
     )
     residual = Unknowns(balance / chain.stiffness, contact_force, log_ratio)
