@@ -53,9 +53,9 @@ def test_it_is_said(cycle):
     assert "prescribe the stroke" in shut
 
 
-def in_fine_steps(path: nf.EquilibriumPath, step: int, steps: int = 400) -> nf.EquilibriumPath:
-    """Return one step of a path, taken in so many."""
-    way = np.linspace(path.tension[step - 1], path.tension[step], steps + 1)
+def in_fine_steps(path: nf.EquilibriumPath, step: int) -> nf.EquilibriumPath:
+    """Return one step of a path, taken in 400."""
+    way = np.linspace(path.tension[step - 1], path.tension[step], 401)
     loads = [nf.Load(tension=tension) for tension in way.tolist()]
     return nf.simulate(path.robot, loads, from_state=path.state_at(step - 1))
 

@@ -143,7 +143,7 @@ def in_tendon_order(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...])
 
 # Friction law: x = clip(x + r (slip - c (x - x_prev))). The augmentation parameter r only affects
 # convergence and drops out at the solution. Slip is in heights of the notch, so that a scaled robot
-# is solved in the same way. The compliance c of sticking contacts keeps the law regular:
+# is solved in the same way. The compliance c of sticking contacts keeps the law regular.
 #
 # Two contacts at one place, such as both edges of a disk without thickness, share what they hold in
 # any way while they stick. On a tendon that stretches they are found with a compliance that is this

@@ -93,13 +93,13 @@ def test_section_and_ends_bend_as_far_as_the_notch_to_rounding(exponent: float, 
     """A search of the curvature that has found it stays there."""
     law = section_law(nf.Superelastic(80.0, 17.0, 0.003, 0.028, 20.0, exponent))
     reduced = np.linspace(-0.5, 0.5, 2001)
-    missing = jax.jit(jax.vmap(lambda x: _beyond(law, x)))(reduced)
+
+    def beyond(reduced: jax.Array) -> jax.Array:
+        bent = law.bent(reduced, SECTION, ())
+        return law.joint(reduced, SECTION).beyond(bent.curvature, bent.moment)
+
+    missing = jax.jit(jax.vmap(beyond))(reduced)
     margin.within("bending, relative", missing[reduced != 0.0] / reduced[reduced != 0.0], 2e-14)
-
-
-def _beyond(law: SectionLaw, reduced: jax.Array) -> jax.Array:
-    bent = law.bent(reduced, SECTION, ())
-    return law.joint(reduced, SECTION).beyond(bent.curvature, bent.moment)
 
 
 @pytest.mark.parametrize("law", [LINEAR, SUPERELASTIC], ids=["linear", "superelastic"])
