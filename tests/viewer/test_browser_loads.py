@@ -33,6 +33,15 @@ def begin_at_rest(visit):
     assert visit.errors == []
 
 
+@pytest.fixture
+def slow_robot(monkeypatch):
+    """The robot takes many seconds from one end of a slider to the other.
+
+    It usually takes one, and a browser on a busy machine types later than that.
+    """
+    monkeypatch.setattr("notchflex.viewer.viewer.MAX_STEPS", 4.0)
+
+
 def ends(visit, label):
     slider = visit.slider(label)
     return [float(slider.get_attribute(f"aria-value{which}")) for which in ("min", "now", "max")]
@@ -82,6 +91,7 @@ def test_stroke_first_and_then_tension(visit):
     visit.set_tension(0.5 * tension)
 
 
+@pytest.mark.usefixtures("slow_robot")
 def test_a_switch_while_the_robot_is_on_its_way_stops_it_and_takes_effect(visit):
     _, stroke = visit.middle
     visit.press("Play a cycle")
@@ -132,6 +142,7 @@ def test_a_slider_cannot_be_stretched_without_limit(visit):
     visit.no_notice()
 
 
+@pytest.mark.usefixtures("slow_robot")
 def test_a_new_number_is_obeyed_at_once_whatever_the_robot_was_on_its_way_to(visit):
     end = ends(visit, TENSION)[2]
     visit.type(TENSION, f"{end:g}")
@@ -154,6 +165,7 @@ def test_typing_slowly_does_not_pass_the_numbers_that_are_typed_on_the_way(visit
     assert min(after) == pytest.approx(wanted)
 
 
+@pytest.mark.usefixtures("slow_robot")
 def test_stop_leaves_the_robot_and_the_box_where_it_is(visit):
     end = ends(visit, TENSION)[2]
     visit.press("Play a cycle")
@@ -167,6 +179,7 @@ def test_stop_leaves_the_robot_and_the_box_where_it_is(visit):
     visit.set_tension(0.25 * end)  # and it goes on from there
 
 
+@pytest.mark.usefixtures("slow_robot")
 def test_reset_on_the_way_leaves_the_free_robot(visit):
     visit.type(TENSION, f"{ends(visit, TENSION)[2]:g}")
     visit.press("Reset")
