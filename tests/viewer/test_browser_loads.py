@@ -149,8 +149,9 @@ def test_a_new_number_is_obeyed_at_once_whatever_the_robot_was_on_its_way_to(vis
     visit.page.wait_for_function(
         "() => parseFloat(document.querySelector('[data-name=tension_1]').innerText) > 0"
     )
-    visit.type(TENSION, f"{0.1 * end:g}")
-    visit.wait_for("tension_1", f"{0.1 * end:.3f}")
+    low = 0.11 * end  # between two steps of the way up
+    visit.type(TENSION, f"{low:g}")
+    visit.wait_for("tension_1", f"{low:.3f}")
     most = max(step.tension[0] for step in visit.viewer.session.history)
     assert most < 0.9 * end
 
