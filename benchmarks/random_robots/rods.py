@@ -306,8 +306,6 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
     off = np.abs(powers @ fits.terms[:, :, k] - fits.curved[k]).max()
     if not off < POSE:
         found.append(f"{name}: its curvature is no polynomial (by {off:.1e})")
-    if not fits.miss[k] < POSE:
-        found.append(f"{name}: no twist of its backbone leads to its pose (by {fits.miss[k]:.1e})")
     begins, start, _, _ = _ends(state, i, 0.0)
     places = begins + length * fits.places[k] @ start.T
     moments, forces, size = _local(state, i, places, start @ fits.turns[k])
@@ -317,10 +315,12 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
     scale, pulled = size[1] + _SMALL * stiff, size[0] + _SMALL * stiff / length
     sideways, twist = stiff * fits.curved[k, :, 0], 2.0 * shear / modulus * stiff * fits.twist[k]
     # Where it bends sharply the solver's integral of the pose is less accurate, and more so about
-    # several axes: it takes states that are off by 2e-6 rad.
+    # several axes: it takes states that are off by 1e-5 rad.
     angles = *np.abs(fits.curved[k]).max(axis=0), abs(fits.twist[k])
     angle = sum(angles)
     several = 0.5 * (angle**2 - np.square(angles).sum())
+    if not fits.miss[k] < POSE + _TURNED * several:
+        found.append(f"{name}: no twist of its backbone leads to its pose (by {fits.miss[k]:.1e})")
     balance = BALANCE * (1.0 + _SHARP * angle**2 + _SEVERAL * several)
     balance += 2.0 * float(state.now.moment_error) ** 2  # what its polynomials miss is told
     flat = max(np.abs(fits.curved[k, :, 0]).max(), abs(fits.twist[k])) < _FLAT

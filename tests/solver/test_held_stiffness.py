@@ -92,6 +92,43 @@ def test_a_tendon_without_tension_leaves_stability_as_it_is(margin):
     assert other.stable == alone.stable
 
 
+@pytest.fixture(scope="module")
+def held_at_thin_disks() -> nf.EquilibriumPath:
+    """A tendon that does not stretch, held at both edges of disks without thickness.
+
+    How two edges at one place share what they hold is not determined, and changes nothing else.
+    """
+    sides = (-20.0, -40.0, -60.0, -80.0)
+    tendon = nf.Tendon(0.9, path="straight", disk_radius=(0.9,) * 4, disk_direction_deg=sides)
+    gaps = (nf.RodGap(5.0, 0.6, uncut_length=0.0, repeat=4),)
+    robot = nf.Robot("thin", nf.Tube(2.4, 0.6), gaps, (tendon,), nf.Linear(60e3), nf.Capstan(0.2))
+    loads = [nf.Load(stroke=0.5, tip_moment=(0.0, moment, 0.0)) for moment in (0.0, 0.2, 0.1, -0.1)]
+    path = nf.simulate(robot, loads)
+    sticks = path.contact_state[1:, 0] == 0
+    assert (sticks[:, 1:6:2] & sticks[:, 2:7:2]).any(), "no disk is held at both edges"
+    return path
+
+
+def test_the_stiffness_of_a_tendon_held_twice_at_one_place(held_at_thin_disks, margin):
+    path = held_at_thin_disks
+    assert path.stable.all()
+    stretches = nf.simulate(path.robot.with_value("tendon.axial_stiffness", 1e8), path.load)
+    ratio = stretches.smallest_eigenvalue / path.smallest_eigenvalue
+    margin.within("eigenvalue", ratio - 1.0, 1e-6)
+
+
+def test_slopes_where_a_tendon_is_held_twice_at_one_place(held_at_thin_disks, margin):
+    path, name, value = held_at_thin_disks, "tendon[1].radius", 0.9
+    slopes = path.jacobian([name], ["tip_position", "tension"])
+    high, low = (
+        nf.simulate(path.robot.with_value(name, value * (1.0 + part)), path.load)
+        for part in (1e-6, -1e-6)
+    )
+    for quantity, slope in slopes.items():
+        change = getattr(high, quantity) - getattr(low, quantity)
+        margin.within(quantity, slope[..., 0] - change / (2e-6 * value), 1e-5)
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize("strokes", [[0.3, 0.3, 0.3, 0.3], [0.3001, 0.3, 0.3001, 0.3]])
 def test_strokes_that_depend_on_each_other_fix_no_tensions(strokes):

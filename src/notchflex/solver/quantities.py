@@ -32,7 +32,7 @@ _ROUNDING = 1e-15
 # Smaller moments do not count, as a fraction of the largest stiffness of a mode (per rad).
 _MIN_RELATIVE_MOMENT = 1e-12
 # States with a larger error of rotation count as not converged, rad.
-_MAX_ROTATION_ERROR = 2e-6
+_MAX_ROTATION_ERROR = 1e-5
 
 
 @Quantity("solve", "tendon tension", "T", "N", key="tendon_tension_N",
@@ -369,12 +369,12 @@ def bend_possible(state: SolvedState) -> Array:
     By less than half a turn, with no fibre shortened to nothing, not beyond the ends of a table,
     and not so far about several axes that the order of its turns is not known well.
     """
-    chain, modes = state.chain, state.solved.point.unknowns.modes
-    below_half_turn = jnp.sum(state.evaluation.flexure.bend**2, axis=-1) < np.pi**2
-    accurate = jax.vmap(rotation_error_estimate)(chain.rods, modes) < _MAX_ROTATION_ERROR
-    law, strain = chain.law, in_space(state.evaluation.flexure.strain)
-    covered = jax.vmap(type(law).covers, (law.axis, 0, 0))(law, strain, chain.rods.section)
-    return jnp.all(below_half_turn & accurate) & jnp.all(covered)
+    chain, flexure = state.chain, state.evaluation.flexure
+    below_half_turn = jnp.sum(flexure.bend**2, axis=-1) < np.pi**2
+    error = jax.vmap(rotation_error_estimate)(chain.rods, state.solved.point.unknowns.modes)
+    covers = jax.vmap(type(chain.law).covers, (chain.law.axis, 0, 0))
+    covered = covers(chain.law, in_space(flexure.strain), chain.rods.section)
+    return jnp.all(below_half_turn & (error < _MAX_ROTATION_ERROR)) & jnp.all(covered)
 
 
 @Quantity("state", "stored energy", "U", "N mm", key="stored_energy_Nmm",

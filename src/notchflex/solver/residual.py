@@ -146,13 +146,14 @@ def in_tendon_order(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...])
 # is solved in the same way. The compliance c of sticking contacts keeps the law regular.
 #
 # Two contacts at one place, such as both edges of a disk without thickness, share what they hold in
-# any way while they stick. On a tendon that stretches they are found with a compliance that is this
-# part of the stretch by the closing force (tests/solver/test_many_strokes.py). The ratios of a
-# slack tendon change nothing, and it counts as one that stretches by a height: with a compliance
-# near the rounding of a slip its ratios were noise, and a reversed stroke took 40 iterations
-# instead of 16 (tests/solver/test_antagonists.py).
+# any way while they stick: without a compliance their rows depend on each other, and slopes and
+# stiffness of such a state are noise (tests/solver/test_held_stiffness.py). On a tendon that
+# stretches they are found with a compliance that is this part of the stretch by the closing force
+# (tests/solver/test_many_strokes.py). The ratios of a slack tendon change nothing, and it counts as
+# one that stretches by a height: with a compliance near the rounding of a slip its ratios were
+# noise, and a reversed stroke took 40 iterations instead of 16 (tests/solver/test_antagonists.py).
 AUGMENTATION = 8.0
-_STICK_STRETCH = 1e-9
+_STICK_COMPLIANCE, _STICK_STRETCH = 1e-14, 1e-9
 
 
 class Unknowns(NamedTuple):
@@ -210,7 +211,8 @@ class Memory(NamedTuple):
     ) -> Float[Array, "n t 1"]:
         """Slip over a sticking contact per change of its log ratio, in heights of the notch."""
         stretch = chain.closing_force / of_group(chain.axial_stiffness, group)[None, :, None]
-        least = _STICK_STRETCH * (stretch + (span.gap_tension[..., None] <= 0.0))
+        stretch += span.gap_tension[..., None] <= 0.0
+        least = _STICK_COMPLIANCE + _STICK_STRETCH * stretch
         return least if self.stick_compliance is None else least + self.stick_compliance
 
 
@@ -434,7 +436,7 @@ def evaluate(
 
 def rounding_growth(chain: Chain, point: Iterate) -> Float[Array, ""]:
     """Return the growth of rounding in the residual: with the moments that tensions balance."""
-    height = jnp.max(jnp.sum(chain.rods.length, axis=-1))
+    height = jnp.max(notch_heights(chain))
     softest = jnp.min(jnp.where(chain.rods.padding_mask > 0.0, jnp.inf, chain.stiffness))
     largest_tension = jnp.max(jnp.maximum(point.base_tension, 0.0), initial=0.0)
     return jnp.minimum(1.0 + largest_tension * (height / softest), _MAX_ROUNDING_GROWTH)
