@@ -45,9 +45,9 @@ _NUDGE = 1e-6
 _SMALL = 2e-3
 # What a rigid direction may give, rad and of the length: rounding of poses.
 _RIGID = 1e-9
-# By how much more a balance may miss, at 1 rad in a plane, and about two axes; strains and a pose
-# about two axes (rad).
-_SHARP, _SEVERAL, _TURNED, _POSED = 30.0, 300.0, 5e-6, 2.5e-5
+# By how much more a balance may miss, at 1 rad in a plane, and about two axes; strains, and a pose,
+# about two axes (rad), and the latter at most.
+_SHARP, _SEVERAL, _TURNED, _POSED, _MOST = 30.0, 300.0, 5e-6, 2.5e-5, 1e-5
 # rad, what is no bending out of a plane
 _FLAT = 1e-9
 
@@ -320,7 +320,7 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
     angles = *np.abs(fits.curved[k]).max(axis=0), abs(fits.twist[k])
     angle = sum(angles)
     several = 0.5 * (angle**2 - np.square(angles).sum())
-    if not fits.miss[k] < POSE + _POSED * several:
+    if not fits.miss[k] < POSE + min(_POSED * several, _MOST):
         found.append(f"{name}: no twist of its backbone leads to its pose (by {fits.miss[k]:.1e})")
     balance = BALANCE * (1.0 + _SHARP * angle**2 + _SEVERAL * several)
     balance += 2.0 * float(state.now.moment_error) ** 2  # what its polynomials miss is told

@@ -147,11 +147,11 @@ def in_tendon_order(chain: Chain, grouped: tuple[Float[Array, "*shape t"], ...])
 #
 # Two contacts at one place, such as both edges of a disk without thickness, share what they hold in
 # any way while they stick: without a compliance their rows depend on each other, and slopes and
-# stiffness of such a state are noise (tests/solver/test_held_stiffness.py). On a tendon that
-# stretches they are found with a compliance that is this part of the stretch by the closing force
-# (tests/solver/test_many_strokes.py). The ratios of a slack tendon change nothing, and it counts as
-# one that stretches by a height: with a compliance near the rounding of a slip its ratios were
-# noise, and a reversed stroke took 40 iterations instead of 16 (tests/solver/test_antagonists.py).
+# stiffness of such a state are noise (tests/solver/test_held_stiffness.py). With 1e-12 tensions of
+# Gao's robot would be off by 5e-6 N. On a tendon that stretches these contacts are found with more
+# (tests/solver/test_many_strokes.py): a part of the stretch by the closing force. The ratios of a
+# slack tendon change nothing, and it counts as one that stretches by a height: with less its ratios
+# were noise, and a reversed stroke took 40 iterations, not 16 (tests/solver/test_antagonists.py).
 AUGMENTATION = 8.0
 _STICK_COMPLIANCE, _STICK_STRETCH = 1e-14, 1e-9
 
