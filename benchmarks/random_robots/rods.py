@@ -20,6 +20,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import RigidTransform, Rotation
 
 import notchflex as nf
+from notchflex.robot.cuts import NotchCut
 
 from .arcs import BALANCE, POSE, ArcLaw, bending
 from .forces import State, about_z, height_of
@@ -351,35 +352,58 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
     return found
 
 
+def taken(cut: NotchCut, tube: nf.Tube, end: float) -> float:
+    """Volume that a cut takes out of a tube up to its end, mm³."""
+    corners, radius = np.array(cut.corners), max(cut.radii)
+    # Slices along the tube, with their middles; many, for the rule is of second order.
+    edges = np.linspace(corners[0, 0], corners[-1, 0], 2001)
+    place = 0.5 * (edges[1:] + edges[:-1])
+    bottom = np.interp(place, *corners.T)
+    beside = np.minimum(np.minimum(place - edges[0], edges[-1] - place), radius)
+    bottom += radius - np.sqrt(radius**2 - (radius - beside) ** 2)
+    outer, inner = (
+        r**2 * np.arccos(c := np.clip(bottom / r, -1.0, 1.0)) - r**2 * c * np.sqrt(1.0 - c**2)
+        for r in (tube.outer_radius, tube.inner_radius)
+    )
+    return float(np.clip(np.diff(np.minimum(edges, end)), 0.0, None) @ (outer - inner))
+
+
 def masses(state: State) -> list[str]:
     """Whether all weighs what the robot says: the sum, and of straight backbones its moment.
 
-    What is cut as strips or links weighs less than if it were full.
+    Of strips across the tube it is the tube less its cuts. One may reach into a notch of another
+    kind, which has its own law.
     """
     robot, chain, mass, first = state.robot, state.path.chain, 0.0, 0.0
-    place, known = 0.0, nf.RodGap | nf.TableNotch | nf.ArcNotch
+    place, rounding, along = 0.0, 1e-9, nf.RodGap | nf.TableNotch | nf.ArcNotch
+    layouts = (None, *robot.geometry.cuts)
+    end = state.length[0] + sum(layout.length for layout in layouts[1:])
     for i, notch in enumerate((None, *robot.notches)):
         tube, density = state.tubes[i], state.materials[i].density or 0.0
         ring = np.pi * (tube.outer_radius**2 - tube.inner_radius**2)
         parts = [(ring * state.length[i], state.length[i], getattr(notch, "disk_mass", None))]
         if notch is not None:
-            area = ring
-            if not isinstance(notch, known):
-                area = np.pi * tube.outer_radius**2
-            elif not isinstance(notch, nf.TableNotch):
+            area, height = ring, layouts[i].length - state.length[i]
+            if isinstance(notch, nf.RodGap | nf.ArcNotch):
                 is_round = isinstance(notch, nf.RodGap)
                 area = (round_section(notch) if is_round else left_by(notch, tube)).area
-            parts.insert(0, (area * height_of(notch), height_of(notch), None))
+            elif not isinstance(notch, along):
+                cuts = [taken(cut, tube, end) for cut in layouts[i].cuts]
+                own = place + height + state.length[i]
+                over = sum(cuts) - sum(taken(cut, tube, own) for cut in layouts[i].cuts)
+                follows = robot.notches[i] if i < len(robot.notches) else None
+                rounding = max(rounding, 1e-4) + isinstance(follows, along) * over / ring / height
+                parts.append((-sum(cuts), 0.0, None))
+            parts.insert(0, (area * height, height, None))
         for volume, length, given in parts:
             weight = 1e-6 * density * volume if given is None else given
             mass, first = mass + weight, first + weight * (place + 0.5 * length)
             place += length
     told = np.asarray(chain.body_mass)
-    if not all(isinstance(notch, known) for notch in robot.notches):
-        return ["its bodies weigh more than if they were full"] if told.sum() > mass else []
     heights = [height_of(notch) for notch in robot.notches]
     starts = np.append(0.0, np.cumsum(state.length[:-1] + heights))
     lever = told @ (starts + np.asarray(chain.body_centre)[:, 2])
     straight = all(isinstance(n, nf.RodGap) and not n.precurvature_deg for n in robot.notches)
     off = abs(told.sum() - mass) / (mass or 1.0), straight * abs(lever - first) / (first or 1.0)
-    return [f"its bodies weigh other than it says (by {max(off):.1e})"] if max(off) > 1e-9 else []
+    found = [f"its bodies weigh other than it says (by {max(off):.1e})"]
+    return found if max(off) > rounding else []

@@ -39,7 +39,7 @@ from notchflex.mechanics.friction import FrictionLaw, friction_law
 from notchflex.mechanics.material import Fibres, Law, LimitLine, MixedLaw, section_law
 from notchflex.mechanics.motion import IN_PLANE, Motion, rotation_about
 from notchflex.mechanics.ring import Side
-from notchflex.mechanics.section import FIBRES, fitted
+from notchflex.mechanics.section import FIBRES, fitted, gauss_on, half_angle
 from notchflex.mechanics.sheath import Sheath, build_sheath
 from notchflex.mechanics.tendon import TUBE_AXIS, TendonGroup, route
 from notchflex.robot import Fatigue, Robot, Tendon, Tube
@@ -247,6 +247,41 @@ def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[Array, " bodies"
     return xp.stack(xp.broadcast_arrays(tube.base_length, *spacings))
 
 
+@cached(64)
+def _beside_strip(
+    notch: Notch, tube: Tube, before: Notch | None, after: Notch | None
+) -> Float[Array, "2 2"]:
+    """Return volumes, and their moments, of the wall before a strip across the tube and behind."""
+    layout = notch.cut_layout(tube, before, after)
+    if layout is None or notch.is_round or not notch.is_cut or notch.spine_cut is not None:
+        return xp.zeros((2, 2))  # of no strip
+    radii, cuts = xp.array([[tube.outer_radius], [tube.inner_radius]]), layout.cuts
+    earlier = before and before.cut_layout(tube, None, notch)
+    if earlier:  # its last cut may reach beyond its own length
+        cuts += tuple(cut.moved(-earlier.length) for cut in earlier.cuts)
+
+    def left(low: Any, high: Any) -> Array:
+        moments = np.pi * radii**2 * xp.stack([high - low, 0.5 * (high - low) ** 2])
+        for cut in cuts:
+            places, heights = xp.array(cut.corners).T
+            start, end = places[0], places[-1]
+            along, weights = gauss_on(*xp.clip(xp.stack([start, end]), low, high), 40)
+            passed = (along - places[:-1, None]) / xp.maximum(xp.diff(places), 1e-99)[:, None]
+            bottom = heights[0] + xp.diff(heights) @ xp.clip(passed, 0.0, 1.0)
+            # Beside its ends the bottom of a cut rises by the rounding of its corners.
+            radius = xp.array(cut.radii).max()
+            inside = xp.maximum(radius - xp.minimum(along - start, end - along), 0.0)
+            bottom = bottom + radius - xp.sqrt(xp.maximum(radius**2 - inside**2, 1e-300))
+            # Beyond that chord lies a segment of a circle less one of the bore.
+            angle = half_angle(radii, radii - bottom, radii + bottom)
+            removed = radii**2 * (angle - 0.5 * xp.sin(2.0 * angle)) * weights
+            moments = moments - removed @ xp.stack([xp.ones(40), along - low], axis=1)
+        return moments[0] - moments[1]
+
+    face = layout.length - notch.spacing(after)
+    return xp.stack([left(0.0, face), left(face, layout.length)])
+
+
 def body_masses(
     robot: Robot, rods: Rod
 ) -> tuple[Float[Array, " bodies"], Float[Array, "bodies 3"]]:
@@ -254,7 +289,9 @@ def body_masses(
     # A body is a piece of uncut tube: the area of the tube's wall times the body's axial length,
     # its centre halfway on the tube axis. Only bodies carry loads, so the mass of each flexure
     # (area of its sections times the length of the neutral axis) is lumped: half at the start of
-    # the neutral axis on the body before it, half at its end on the body after it.
+    # the neutral axis on the body before it, half at its end on the body after it. A strip across
+    # the tube belongs to the body behind it, with all that its cuts leave of the wall there; what
+    # they leave before the strip belongs to the body before.
     length = body_lengths(robot.tube, robot.notches)
     masses = [None, *(notch.mass for notch in robot.notches)]
     if robot.densities is None and all(mass is None for mass in masses):
@@ -265,22 +302,28 @@ def body_masses(
     relative = xp.array([each / densities[0] for each in robot.densities or [0.0] * len(length)])
     radii = [(tube.outer_radius, tube.inner_radius) for tube in robot.tubes]
     outer, inner = xp.array(radii).T
+    around = (None, *robot.notches, None)
+    walls = xp.stack([*map(_beside_strip, robot.notches, robot.tubes[1:], around, around[2:])])
+    is_strip = walls[:, 1, 0] > 0.0
     piece = np.pi * (outer**2 - inner**2) * length * relative
+    piece = xp.where(xp.append(False, is_strip), 0.0, piece)
     if any(mass is not None for mass in masses):
         given = [piece[k] if m is None else 1e6 * m / densities[0] for k, m in enumerate(masses)]
         piece = xp.stack(xp.broadcast_arrays(*given))
     half = 0.5 * xp.sum(rods.section.area * rods.length, axis=-1) * relative[1:]
-    end = -xp.einsum("nba,nb->na", rods.end_rotation, rods.end_offset)
-    before, behind = xp.append(half, 0.0), xp.append(0.0, half)
-    # Every body has a volume: where no tube is left between two notches, half of each flexure.
-    volume = piece + before + behind
-    on_axis = (0.5 * length * piece)[:, None] * np.eye(3)[2]
     # The weight of a backbone turns its ends as a beam's does (w L^2/12): a sixth of L inside them.
     is_round = xp.array([float(notch.is_round) for notch in robot.notches])
     inside = (is_round * xp.sum(rods.length, axis=-1) / 6.0)[:, None] * TUBE_AXIS
-    at_starts = before[:, None] * xp.pad(rods.start_offset + inside, ((0, 1), (0, 0)))
-    at_ends = behind[:, None] * xp.pad(end - inside, ((1, 0), (0, 0)))
-    moment = on_axis + at_starts + at_ends
+    end = -xp.einsum("nba,nb->na", rods.end_rotation, rods.end_offset)
+    # Every body has a volume: where no tube is left between two notches, half of each flexure.
+    volume, moment = piece, (0.5 * length * piece)[:, None] * TUBE_AXIS
+    places = (rods.start_offset + inside, length[:-1]), (end - inside, 0.0)
+    for side, (place, origin) in enumerate(places):
+        wall, first = walls[:, side].T * relative[1:]
+        on_axis = (first + origin * wall)[:, None] * TUBE_AXIS
+        first = xp.where(is_strip[:, None], on_axis, half[:, None] * place)
+        volume = volume + xp.pad(xp.where(is_strip, wall, half), (side, 1 - side))
+        moment = moment + xp.pad(first, ((side, 1 - side), (0, 0)))
     return 1e-6 * densities[0] * volume, moment / xp.where(volume > 0.0, volume, 1.0)[:, None]
 
 
