@@ -14,7 +14,7 @@ import numpy as np
 
 import notchflex as nf
 from notchflex.mechanics.chain import sites_of
-from notchflex.mechanics.ends import place_of
+from notchflex.mechanics.flexure.arc import place_of
 from notchflex.mechanics.law_errors import Place
 from reference_data import named_rows
 
@@ -126,15 +126,10 @@ def errors_by_place(rows: list[dict[str, Any]]) -> list[tuple[Place, float, floa
     parts = {1: found}
     if found.shape[1] > 1:
         parts = dict(zip((0, 1, -1), np.split(found, [1, -1], axis=1), strict=True))
-    tube, sites = robot.tube, sites_of(robot)
-    shape = (
-        tube.outer_radius,
-        tube.inner_radius,
-        *(rows[0][key] for key in ("cut", "depth", "height")),
-    )
+    sites = sites_of(robot)
     return [
         (
-            place_of(*shape, sites[i].proximal, sites[i].distal, robot.material.by_fibres),
+            place_of(robot.notches[i], robot.tube, sites[i], robot.material.by_fibres),
             float(np.sqrt(np.nanmean(part**2))),
             float(np.nanmax(np.abs(part))),
         )

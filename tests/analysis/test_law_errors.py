@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from fem_notches import left_by
 from fem_wrists import LINEAR, drawn, drawn_wrists, errors_by_place, stiffness_errors
 from margins import Margin
 from notchflex.analysis.draws import tolerances_of
-from notchflex.mechanics.ends import validity
 from notchflex.mechanics.law_errors import error_at, table
 from notchflex.mechanics.ring import Side
 from notchflex.support import law_errors
@@ -74,7 +74,7 @@ def test_outside_the_table_the_border_counts():
     """The error stays finite, and a sentence says what is known."""
     notch = 0.81, 0.7, "on-axis", 1.0, 0.8
     ring = Side("between", 1.2)
-    (sentence,) = validity(*notch, ring, ring)
+    (sentence,) = left_by(*notch, ring, ring)
     assert sentence.startswith("depth / outer diameter is 0.617, below 0.68: the stiffness")
     robot = nf.load_robot("pacheco2021-a-true")
     at = [law_errors(robot.with_value("notch.depth", depth))["notch"] for depth in (0.9, 1.0, 1.4)]

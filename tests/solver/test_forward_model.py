@@ -38,8 +38,8 @@ def test_adjoint_is_the_transpose_of_the_tangents(name, load, outputs, margin):
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # that XLA had to compile it
         found = path_gradient(path, weights).along(change)
-        moved = PathTangents(path, outputs).along([change])[0]
-    expected = sum(float(np.nansum(moved[one] * weights[one])) for one in outputs)
+        moved = PathTangents(path, outputs).along([change])
+    expected = sum(float(np.nansum(moved[one][0] * weights[one])) for one in outputs)
     margin.within("adjoint", found / expected - 1.0, 1e-11)
 
 

@@ -287,13 +287,17 @@ def closing(robot: Robot) -> Closing:
     arm = moment_arms(chain)
     tendon, longest = arm.argmax(axis=1), arm.max(axis=1)
     has_spine = np.isfinite(closing_angle)
-    ready, contact_angle = prepare(robot), np.full(len(height), np.nan)
+    ready, (tension, contact_angle) = prepare(robot), np.full((2, len(height)), np.nan)
+    status = np.full(len(height), ClosingStatus.NEVER, object)
     if not any(pair.acts_on_bodies for pair in chain.contact_pairs):
-        tension, status = _tensions(ready, tendon, longest, closing_angle)
+        closes = np.flatnonzero((longest > 0.0) & (closing_angle > 0.0) & has_spine)
+        if len(closes):
+            stiffness = np.asarray(ready.chain.stiffness)[closes, 0]
+            linear = stiffness * closing_angle[closes] / longest[closes]
+            tension[closes], status[closes] = _tensions(ready, tendon, closes, linear)
     else:
         # A backbone has no edges that meet.
         meets = sum((pair.has_contact.sum(axis=-1) for pair in chain.contact_pairs), 0.0 * longest)
-        tension, status = contact_angle.copy(), np.full(len(height), ClosingStatus.NEVER, object)
         for number in np.unique(tendon):
             # It is pulled in steps from rest, which brackets the tension where an edge touches.
             pulled = np.flatnonzero((tendon == number) & (longest > 0.0) & (meets > 0.0))
@@ -337,18 +341,10 @@ def moment_arms(chain: Chain) -> Float[np.ndarray, "n t"]:
 
 
 def _tensions(
-    ready: PreparedChain,
-    tendon: np.ndarray,
-    arm: PerNotch,
-    closing_angle: PerNotch,
-) -> tuple[PerNotch, np.ndarray]:
-    """Find the base tension that closes every notch against its spine, and its status."""
+    ready: PreparedChain, tendon: np.ndarray, notches: np.ndarray, guess: Searched
+) -> tuple[Searched, np.ndarray]:
+    """Find the base tension that closes some notches against their spines, and its status."""
     chain = ready.chain
-    tension = np.full(chain.flexures, np.nan)
-    status = np.full(chain.flexures, ClosingStatus.NEVER, dtype=object)
-    notches = np.flatnonzero((arm > 0.0) & (closing_angle > 0.0) & np.isfinite(closing_angle))
-    if len(notches) == 0:
-        return tension, status
     stiffness = np.asarray(chain.contact_stiffness)
     # As many rows as notches, whichever are searched: one compiled program.
     searched, rows = np.resize(notches, chain.flexures), np.arange(chain.flexures)
@@ -362,9 +358,7 @@ def _tensions(
         overlap = force[rows, searched] / stiffness[searched] - gap[rows, searched]
         return np.where(converged, overlap, np.nan)[: len(notches)]
 
-    linear = np.asarray(chain.stiffness)[notches, 0] * closing_angle[notches] / arm[notches]
-    tension[notches], status[notches] = closing_tensions(overlap, linear)
-    return tension, status
+    return closing_tensions(overlap, guess)
 
 
 def _by_one_tendon(

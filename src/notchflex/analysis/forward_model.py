@@ -216,8 +216,7 @@ def tip_response(
     path = model.solve(robot, load)
     changes = [Change(np.tile(unit, (len(path), 1)), None) for unit in _unit_loads(path)]
     # Each state is varied alone: what the contacts remember of the state before stays.
-    columns = PathTangents(path, _POSE, remembers=False).along(changes)
-    by_loads = {name: np.stack([column[name] for column in columns]) for name in _POSE}
+    by_loads = PathTangents(path, _POSE, remembers=False).along(changes)
     # Rotation vectors and displacements of the tip, in the world.
     spin = by_loads["tip_rotation"] @ np.swapaxes(path.tip_rotation, -1, -2)
     turned = [0.5 * (spin[..., b, a] - spin[..., a, b]) for a, b in ((1, 2), (2, 0), (0, 1))]

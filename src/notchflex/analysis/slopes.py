@@ -291,8 +291,7 @@ def derivatives(path: EquilibriumPath, along: Sequence[Change], outputs: tuple[s
     """
     shapes = {name: np.shape(path.quantity(name)) for name in outputs}
     if _ADJOINT * sum(map(math.prod, shapes.values())) > len(along):
-        columns = PathTangents(path, outputs).along(along)
-        return {name: np.stack([column[name] for column in columns]) for name in outputs}
+        return PathTangents(path, outputs).along(along)
     slopes = {name: np.empty((len(along), *shape)) for name, shape in shapes.items()}
     for name, shape in shapes.items():
         for index in np.ndindex(shape):

@@ -96,8 +96,8 @@ class PathTangents:
     outputs: tuple[str, ...]  # quantities that the solver reports as floats
     remembers: bool = True  # whether changes pass on through the memory of contacts
 
-    def along(self, directions: Sequence[Change]) -> list[Arrays]:
-        """Differentiate the outputs, in the world, along each of some directions."""
+    def along(self, directions: Sequence[Change]) -> Arrays:
+        """Differentiate the outputs, in the world, along some directions, the leading axis."""
         # NaN from a step on that did not converge, or was so hard that its derivatives are not
         # known.
         ready = self.path.prepared
@@ -106,7 +106,7 @@ class PathTangents:
         start = np.zeros(ready.long.state.size)
         by_row = (*(False,) * 3, *(True,) * (len(self.steps) + 2))
         turn = self.path.load.base_to_world
-        by_direction: list[Arrays] = []
+        by_output: dict[str, list[np.ndarray]] = {name: [] for name in self.outputs}
         for direction in directions:
             change = np.zeros(layouts.chain.size if varies else 1)
             if direction.chain is not None:
@@ -116,12 +116,10 @@ class PathTangents:
                 load_change[:, self.unpadded_loads] = direction.loads
             vectors = (start, ready.long.dynamic_vector, change, *self.steps, self.loads)
             packed = map(Packed, (*vectors, load_change), repeat(None), by_row)
-            by_name = tangent_step.scan(*packed, layouts)
-            for name, values in by_name.items():
+            for name, values in tangent_step.scan(*packed, layouts).items():
                 unpadded = unpad_quantity(self.path.chain, name, values)
-                by_name[name] = REGISTERED[name].turned(unpadded, turn)
-            by_direction.append(by_name)
-        return by_direction
+                by_output[name].append(REGISTERED[name].turned(unpadded, turn))
+        return {name: np.stack(values) for name, values in by_output.items()}
 
     @property
     def unpadded_loads(self) -> Int[np.ndarray, " command"]:

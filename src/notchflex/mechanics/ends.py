@@ -10,7 +10,6 @@ import numpy as np
 from notchflex._arrays import cached, plain_number, xp
 from notchflex.mechanics.cuts import SECTION_OF_CUT
 from notchflex.mechanics.flattening import FACTORS, distortion, softening
-from notchflex.mechanics.law_errors import Place, covered
 from notchflex.mechanics.ring import (
     HARMONICS,
     Side,
@@ -187,10 +186,11 @@ def notch_stiffness(
     """Compute the stiffness of a notch from the drawing."""
     section = SECTION_OF_CUT[cut](outer_radius, inner_radius, depth)
     arc = arc_of(outer_radius, inner_radius, section)
-    sides: list[Side] = []
-    for side in (proximal, distal):  # cut where the effects of the edge have died out
-        longest = plain_number(reach_of(arc) * (1.0 + side.shares[0]))
-        sides.append(side._replace(length=xp.minimum(side.length, longest)))
+    reach = reach_of(arc)
+    sides = [  # cut where the effects of the edge have died out
+        side._replace(length=xp.minimum(side.length, reach * (1.0 + side.shares[0])))
+        for side in (proximal, distal)
+    ]
     distorted = distortion(arc, poisson_ratio)
     factors = FACTORS[cut]
     added = [
@@ -246,71 +246,3 @@ def left_ranges(dimensions: list[Dimension]) -> list[str]:
                 sentences.append(f"{dimension} is {value:.3g}, {side} {bound:g}: {beyond}")
                 break
     return sentences
-
-
-def place_of(
-    outer_radius: float,
-    inner_radius: float,
-    cut: str,
-    depth: float,
-    height: float,
-    proximal: Side,
-    distal: Side,
-    yields: bool = False,
-) -> Place:
-    """Return where a notch stands among the wrists of finite elements."""
-    diameter = 2.0 * outer_radius
-    # Between a notch and a plate right at its edge there is no ring.
-    sides = [side for side in (proximal, distal) if side.length or side.boundary != "clamped"]
-    ring = min((side.length for side in sides), default=diameter)
-    return Place(
-        (outer_radius - inner_radius) / diameter,
-        depth / diameter,
-        height / diameter,
-        ring / diameter,
-        cut == "on-axis",
-        yields,
-        distal.boundary == "free",
-    )
-
-
-def validity(
-    outer_radius: float,
-    inner_radius: float,
-    cut: str,
-    depth: float,
-    height: float,
-    proximal: Side,
-    distal: Side,
-) -> list[str]:
-    """List the checked ranges that a notch leaves, each with the error found beyond it."""
-    sentences: list[str] = []
-    if cut == "off-axis" and depth >= outer_radius + inner_radius:
-        sentences.append(
-            f"depth is {depth:.4g} mm, beyond the far side of the bore at "
-            f"{outer_radius + inner_radius:.4g} mm, where a solid strip is left: the stiffness was "
-            "found wrong by up to 23 %"
-        )
-    place = place_of(outer_radius, inner_radius, cut, depth, height, proximal, distal)
-    names = "wall", "depth", "height", "ring"
-    for number, (name, value) in enumerate(zip(names, place, strict=False)):
-        low, high, *found = covered(number, place.last)
-        known = [
-            f"the stiffness was found up to {100.0 * most:.0f} % off inside, near that bound"
-            for most in found
-        ]
-        if name == "wall":
-            known[0] += ", and 85 % with a wall of 0.037 outer diameters"
-        # Of higher notches the rings, and of longer rings what lies far off, are a small part.
-        least, most = float(f"{low:.2g}"), float(f"{high:.2g}") if number < 2 else np.inf
-        ranges = [(least, np.inf, known[0]), (0.0, most, known[1])]
-        sentences += left_ranges([(f"{name} / outer diameter", value, ranges)])
-    turned = {side.length for side in (proximal, distal) if side.turned}
-    # With a ring of 1.9 outer diameters the chain agrees with finite elements to 2 %.
-    return sentences + [
-        f"a neighbour opens to another side of the tube, and the ring between them is {length:.3g} "
-        "mm long, below 1.5 outer diameters: both were found too stiff, 1.4 times with 0.6 outer "
-        "diameters and up to 2 times with 0.4"
-        for length in sorted(turned)
-        if length < 3.0 * outer_radius
-    ]

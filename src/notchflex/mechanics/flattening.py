@@ -124,19 +124,14 @@ _DERIVATIVES = np.array([np.linalg.matrix_power(_DERIVATIVE, order) for order in
 
 
 def _distorted_by_rings(
-    distorted: Distortion,
-    height: float,
-    warped: Float[Array, "2 2"],
-    yielding: Float[Array, "2 2 2"],
+    distorted: Distortion, height: float, rings: Sequence[EndCompliance]
 ) -> Array:
     """Integrate the distortion that the rings make along a notch, per unit of moment.
 
     Args:
         distorted: How the section distorts.
         height: Height of the notch, mm.
-        warped: Of either ring, how far its edge moves by the stress of the arc, in the directions
-            of the loads of the distortion.
-        yielding: Its compliance to these loads.
+        rings: What either ring adds; the loads are those of the distortion.
     """
     # V is what decays from either end; there [C V', -C V] - R [V'', V'''] is what the ring does.
     rate = (distorted.around / (4.0 * distorted.along)) ** 0.25
@@ -146,14 +141,9 @@ def _distorted_by_rings(
     own = powers[:, None] * (_DERIVATIVES @ here)
     other = (powers * (-1.0) ** np.arange(4))[:, None] * (_DERIVATIVES @ there)
     held = distorted.along * np.array([[0.0, 1.0], [-1.0, 0.0]])
-    first, last = (xp.concatenate([held, -compliance], 1) for compliance in yielding)
-    system = xp.concatenate(
-        [
-            xp.concatenate([first @ own, first @ other], 1),
-            xp.concatenate([last @ other, last @ own], 1),
-        ]
-    )
-    amplitudes = inverse(system) @ warped.ravel()
+    first, last = (xp.concatenate([held, -ring.yielding], 1) for ring in rings)
+    system = xp.block([[first @ own, first @ other], [last @ other, last @ own]])
+    amplitudes = inverse(system) @ xp.concatenate([ring.warped for ring in rings])
     total = np.linalg.inv(_DERIVATIVE) @ (there - here) / rate
     return xp.sum(amplitudes.reshape(2, 2) @ total)
 
@@ -172,12 +162,7 @@ def softening(
     r, t, first, second = arc.radius, arc.wall, distorted.first, distorted.second
     phi = 2.0 * t * r**3 * xp.abs(first) / second_moment
     poisson = _POISSON * poisson_ratio * r * phi * height
-    by_rings = _distorted_by_rings(
-        distorted,
-        height,
-        xp.stack([ring.warped for ring in rings]),
-        xp.stack([ring.yielding for ring in rings]),
-    )
+    by_rings = _distorted_by_rings(distorted, height, rings)
     warped = -2.0 * _RINGS * r**2 * t * second * by_rings
     brazier = 48.0 * (1.0 - poisson_ratio**2) * r**7 * second / (t * second_moment)
     fitted = _BRAZIER * arc.half_angle**_WIDTH * (height / r) ** _HEIGHT

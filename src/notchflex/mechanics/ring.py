@@ -213,14 +213,12 @@ def inverse(matrix: Array) -> Array:
     left, last = matrix[..., half:, :half], matrix[..., half:, half:]
     if half == 1:
         scale = 1.0 / (first * last - right * left)
-        rows = [[last, -right], [-left, first]]
-        return scale * xp.concatenate([xp.concatenate(row, axis=-1) for row in rows], axis=-2)
+        return scale * xp.block([[last, -right], [-left, first]])
     before = inverse(first)
     below = left @ before
     rest = inverse(last - below @ right)
     beside = -before @ right @ rest
-    rows = [[before - beside @ below, beside], [-rest @ below, rest]]
-    return xp.concatenate([xp.concatenate(row, axis=-1) for row in rows], axis=-2)
+    return xp.block([[before - beside @ below, beside], [-rest @ below, rest]])
 
 
 @cached(256)  # rings of one length are equal, however deep the notches beside them
@@ -355,10 +353,10 @@ def end_compliance(
     # A tendon that ends there pulls the edge along: in the bending of the notch its pull counts as
     # a tension of the arc does.
     anchored, n = 1.0 * (side.anchor > 0.0), np.arange(HARMONICS)
-    at_edge = (-1.0) ** n / (arc.radius * EDGE_NORM)  # opposite the arc, in harmonics
+    at_edge = (-1.0) ** n / bound  # opposite the arc, in harmonics
     nought, moment = 0.0 * at_edge, -(side.anchor - arc.radius) * at_edge
     pull = anchored * xp.stack([nought, nought, at_edge, moment], axis=-1)
-    relaxed = bound * np.where(np.arange(HARMONICS) < 2, 1.0, relaxation)
+    relaxed = bound * np.where(n < 2, 1.0, relaxation)
     by_weak = energy(weak, xp.stack([weak, axial]), relaxed) - energy(
         weak, xp.stack([0.0 * pull, pull]), bound
     )

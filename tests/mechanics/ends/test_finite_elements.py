@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fem_notches import YOUNG, chain_bending, moments, other_directions, single_notch
+from fem_notches import YOUNG, chain_bending, left_by, moments, other_directions, single_notch
 from notchflex.mechanics.cuts import SECTION_OF_CUT
-from notchflex.mechanics.ends import notch_stiffness, validity
+from notchflex.mechanics.ends import notch_stiffness
 from notchflex.mechanics.ring import Side
 
 
@@ -67,7 +67,7 @@ def test_closing():
 
 def test_validity_names_what_is_left():
     ring = Side("between", 1.2)
-    assert validity(0.81, 0.7, "on-axis", 1.4, 0.8, ring, ring) == []
+    assert left_by(0.81, 0.7, "on-axis", 1.4, 0.8, ring, ring) == []
     said = {
         "solid strip": (0.58, 0.43, "off-axis", 1.044, 0.5),
         "depth": (0.81, 0.7, "on-axis", 1.05, 0.8),
@@ -75,8 +75,8 @@ def test_validity_names_what_is_left():
         "height": (0.81, 0.7, "on-axis", 1.4, 0.12),
     }
     for word, notch in said.items():
-        assert any(word in text for text in validity(*notch, ring, ring)), word
+        assert any(word in text for text in left_by(*notch, ring, ring)), word
     for far in (Side("free", 3.0), Side("clamped", 300.0), Side("clamped", 0.0)):
-        assert validity(0.81, 0.7, "on-axis", 1.4, 0.8, ring, far) == []
-    (near,) = validity(0.81, 0.7, "on-axis", 1.4, 0.8, ring, Side("free", 0.15))
+        assert left_by(0.81, 0.7, "on-axis", 1.4, 0.8, ring, far) == []
+    (near,) = left_by(0.81, 0.7, "on-axis", 1.4, 0.8, ring, Side("free", 0.15))
     assert near.startswith("ring / outer diameter is 0.0926, below 0.2")

@@ -11,6 +11,7 @@ import pytest
 import notchflex as nf
 from margins import Margin
 from notchflex._jax import jax, jnp
+from notchflex.mechanics.chain import unchecked_dimensions
 from notchflex.mechanics.flexure import (
     Site,
     flexure_state,
@@ -167,7 +168,7 @@ def test_cells_outside_validity(margin: Margin) -> None:
 def test_validity_names_each_range() -> None:
     tube = nf.Tube(10.0, 6.0)
     assert left_ranges(liu(), tube) == []
-    assert left_ranges(nf.StripNotch(3.5, 1.5, 6.9), tube) == []
+    assert unchecked_dimensions(nf.load_robot("liu2022")) == []  # a model of a paper
     row = nf.StripNotch(3.5, 1.5, 6.9, ends="elastic")
     (text,) = left_ranges(row, tube)
     assert text.startswith("uncut length / height is 0, below 0.7")

@@ -56,7 +56,7 @@ class RodConfiguration(NamedTuple):
 
 def integrate_rod(rod: Rod, modes: Modes) -> RodConfiguration:
     """Integrate the rotations and steps of a rod for given modes."""
-    hat = xp.concatenate([xp.ones(1), modes])
+    hat = xp.append(1.0, modes)
     from_place = None
     if rod.turn_pair is None:
         rotation, turn = rotation_about(rod.turn @ hat), rod.turn[..., 1:]
@@ -92,7 +92,7 @@ def rotation_error_estimate(rod: Rod, modes: Modes) -> Float[Array, ""]:
     # square. Without the third, the sum is 0.9 to 7 times the error of gaps and arcs.
     if rod.turn_pair is None:
         return jnp.zeros(())
-    hat = jnp.concatenate([jnp.ones(1), modes])
+    hat = jnp.append(1.0, modes)
     turns, _ = _turns(rod, hat)
     second = jnp.linalg.norm(_by_pair(rod, hat) @ hat, axis=-1)
     step = jnp.linalg.norm(turns[1:] - turns[:-1], axis=-1)
@@ -107,7 +107,7 @@ def rotations_before(values: Float[Array, "places 3 3"]) -> Float[Array, "places
 
 def _small_motion(rod: Rod, modes: Modes) -> Motion:
     """Compute the end motion of small deflection: displacements proportional to the strains."""
-    hat = xp.concatenate([xp.ones(1), modes])
+    hat = xp.append(1.0, modes)
     turn, moved = rod.turn[-1] @ hat, rod.step.sum(axis=0) @ hat
     rotation, end = rotation_about(turn), rod.curve_offset
     return Motion(rotation, end + cross(turn, end) + moved - rotation @ end)
@@ -173,7 +173,7 @@ def node_poses(rod: Rod, modes: Modes, state: RodConfiguration | None = None) ->
     state = integrate_rod(rod, modes) if state is None else state
     start = Motion(rod.start_rotation, rod.start_offset)
     turns = jnp.concatenate([jnp.zeros_like(rod.turn[:1]), rod.turn])
-    hat = jnp.concatenate([jnp.ones(1), modes])
+    hat = jnp.append(1.0, modes)
     vectors = (rod.node_turn - turns[rod.node_index]) @ hat
     unturned = jnp.eye(len(state.rotation[0]))[None]
     before = jnp.concatenate([unturned, state.rotation])[rod.node_index]

@@ -235,6 +235,16 @@ def with_sideways(
 _STIFF = 1e-6
 
 
+def walls_at(along: Array, tube: Tube) -> tuple[Array, Array]:
+    """Return the width of the tube's walls where a strip is, mm, and the distance of their middles.
+
+    Beyond the lumen they are one, and the middles those of its halves.
+    """
+    outer = xp.sqrt(tube.outer_radius**2 - along**2)
+    inner = xp.sqrt(xp.maximum(tube.inner_radius**2 - along**2, 0.0))
+    return outer - inner, 0.5 * (outer + inner)
+
+
 def strip_sections(
     strip: RootedStrip,
     tube: Tube,
@@ -246,10 +256,8 @@ def strip_sections(
     """Compute the sections of the strip (as wide as the tube's walls) and of its roots."""
     # Beyond the tips of the slots the width of the walls is constant.
     inside = xp.minimum(xp.abs(along), strip.half)
-    outer = xp.sqrt(tube.outer_radius**2 - inside**2)
-    inner = xp.sqrt(xp.maximum(tube.inner_radius**2 - inside**2, 0.0))
-    middle = 0.5 * (outer + inner)
-    width = strip.wall / (tube.outer_radius - tube.inner_radius) * (outer - inner)
+    across, middle = walls_at(inside, tube)
+    width = strip.wall / (tube.outer_radius - tube.inner_radius) * across
     rounded = xp.maximum(inside - strip.tip, 0.0)
     thickness = strip.thickness + strip.radius - xp.sqrt(strip.radius**2 - rounded**2)
     walls = two_walls(width, thickness, middle)

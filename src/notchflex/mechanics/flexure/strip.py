@@ -87,8 +87,6 @@ def strip_rod(
 
 @validity_warnings.register
 def _(notch: StripNotch, tube: Tube, site: Site) -> list[str]:
-    if not notch.has_elastic_ends:  # a model of a paper
-        return []
     thickness, outer = notch.strip_thickness, tube.outer_diameter
     overlap = 2.0 * notch.depth - outer
     slanting = (

@@ -39,6 +39,7 @@ from notchflex.mechanics.flexure.roots import (
     rooted_strip_rod,
     round_strip,
     wall_ranges,
+    walls_at,
 )
 from notchflex.mechanics.section import clamped_torsion_constant, gauss_on, two_walls
 from notchflex.robot import Tube, ULink
@@ -210,12 +211,9 @@ def u_link_rod(
     # One node less moves the tip of 27 links by 4e-8 mm, modes left out by 1e-5 mm.
     points = rod_quadrature(ends, counts, tuple(count - 1 for count in counts))
     course = link.course(np.append(points.unit.positions, [0.0, 3.0]))
-    # Two walls as wide as the tube's wall there, joined beyond the lumen.
-    along = course.along[:-2]
-    outer = xp.sqrt(tube.outer_radius**2 - along**2)
-    inner = xp.sqrt(xp.maximum(tube.inner_radius**2 - along**2, 0.0))
-    walls = two_walls(outer - inner, course.thickness[:-2], 0.5 * (outer + inner))
-    torsion = clamped_torsion_constant(walls, 0.5 * (outer + inner), link.length, poisson_ratio)
+    width, apart = walls_at(course.along[:-2], tube)
+    walls = two_walls(width, course.thickness[:-2], apart)
+    torsion = clamped_torsion_constant(walls, apart, link.length, poisson_ratio)
     section = about_neutral_axis(walls, torsion)
     # A slot cut from the side away from the bend leaves the wall on the bend's side, where the
     # link then begins; over the slot that follows stands its mirror image.
@@ -232,8 +230,6 @@ def u_link_rod(
 
 @validity_warnings.register
 def _(notch: ULink, tube: Tube, site: Site) -> list[str]:
-    if not notch.has_elastic_ends:  # a model of a paper
-        return []
     thickness, length = notch.strip_thickness, notch.strip_length
     outer, radius = tube.outer_diameter, notch.slot_radius
     wide = "stretch and shear were found up to 10 % off"
