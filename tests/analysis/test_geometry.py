@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from notchflex.export.cuts import cuts_of
+from notchflex.export.solids import SolidOptions, straight_solid
 from refusals import refused
 
 
@@ -52,6 +54,25 @@ def test_masses_add_up_to_the_tube_without_its_cuts(wrist: nf.Robot):
     volume = np.pi * rings * 6.0 + half * rings * 4.0  # five rings, and five spines
     assert geometry.body_mass.sum() == pytest.approx(6450.0e-6 * volume, rel=1e-9)
     assert geometry.body_centre.shape == (6, 3)
+
+
+@pytest.mark.parametrize("name", ["liu2022", "gao2017"])
+@pytest.mark.parametrize("uncut", [0.0, 2.0, 4.0])
+@pytest.mark.parametrize("ends", ["rigid", "elastic"])
+def test_strips_weigh_what_their_solid_does(name: str, uncut: float, ends: str):
+    """The sum to the flat sides of the solid, 1e-4; its middle along the tube to 1e-3 mm."""
+    changes = {"notch.ends": ends, "notch.uncut_length": uncut, "material.density": 1e6}
+    robot = nf.load_robot(name).with_values(changes)
+    geometry = robot.geometry
+    whole = straight_solid(robot, cuts_of(robot), SolidOptions())
+    mesh = whole.trim_by_plane((0.0, 0.0, -1.0), -geometry.length).to_mesh()
+    corners = np.asarray(mesh.vert_properties, float)[np.asarray(mesh.tri_verts), :3]
+    volume = np.linalg.det(corners) / 6.0  # of tetrahedra with the origin
+    assert geometry.body_mass.sum() == pytest.approx(volume.sum(), rel=1e-4)
+    assert (geometry.body_mass[1:] > 0.0).all()
+    place = geometry.body_start + geometry.body_centre[:, 2]
+    middle = volume @ corners[..., 2].sum(axis=1) / 4.0 / volume.sum()
+    assert geometry.body_mass @ place / geometry.body_mass.sum() == pytest.approx(middle, abs=1e-3)
 
 
 def test_cuts_stand_where_the_notches_do(wrist: nf.Robot):
