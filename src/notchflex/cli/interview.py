@@ -225,8 +225,9 @@ class Interview:
         """Ask for the number of notches, and for their keys: one value, or each its own."""
         kind = self._kind(Notch, asks=self.person)
         cut = self._keys("notch", kind, "cut")
-        limits: Field = {"type": "integer", "ge": 1, "le": MOST_NOTCHES}
-        count = self._ask("--notches", description="number of notches", **limits)
+        count = self._ask(
+            "--notches", description="number of notches", type="integer", ge=1, le=MOST_NOTCHES
+        )
         below = {"lt": tube.outer_diameter}
         rows = [cut | row for row in self._rows("notch", kind, count, depth=below, but=cut)]
         runs = [list(run) for _, run in groupby(enumerate(rows), key=lambda item: item[1])]

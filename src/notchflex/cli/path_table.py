@@ -58,10 +58,8 @@ MEANINGS = {
 }
 """Texts of the legend; other quantities have their titles there."""
 
-_EVERY_STEP = (
-    "commanded_tension", "commanded_stroke", "temperature", "sheath_bend",
-    "converged", "reason", "residual", "iterations",
-)  # fmt: skip
+_COMMANDS = ("commanded_tension", "commanded_stroke", "temperature", "sheath_bend")
+_EVERY_STEP = (*_COMMANDS, "converged", "reason", "residual", "iterations")
 """Quantities that steps without convergence have too."""
 
 MAX_ROWS = 60
@@ -88,9 +86,9 @@ def print_path(
     path: EquilibriumPath,
     title: str,
     *,
-    columns: Sequence[str] = (),
-    every_row: bool = False,
-    bands: Bands | None = None,
+    columns: Sequence[str],
+    every_row: bool,
+    bands: Bands | None,
 ) -> None:
     """Print the steps of a path with units, or the ends and the middle of bands of tolerances.
 
@@ -146,7 +144,7 @@ def _print_lines(text: str, width: int, indent: str = "") -> None:
 
 
 def print_beside(
-    paths: Mapping[str, EquilibriumPath], *, columns: Sequence[str] = (), every_row: bool = False
+    paths: Mapping[str, EquilibriumPath], *, columns: Sequence[str], every_row: bool
 ) -> None:
     """Print quantities of several paths under the same loads, side by side."""
     first = next(iter(paths.values()))
@@ -191,8 +189,7 @@ def banded_columns(
     bands: Bands, rows: Sequence[int], names: Sequence[str]
 ) -> dict[str, list[PathColumn]]:
     """Return what is commanded, and low end, middle and high end of quantities."""
-    commands = ("commanded_tension", "commanded_stroke", "temperature", "sheath_bend")
-    shown = {name: path_columns(bands.path, rows, name) for name in (*commands, *names)}
+    shown = {name: path_columns(bands.path, rows, name) for name in (*_COMMANDS, *names)}
     for name in (name for name in names if name in bands):
         ends = [path_columns(bands.end(end), rows, name) for end in ("low", "median", "high")]
         shown[name] = [
@@ -200,7 +197,7 @@ def banded_columns(
             for triple in zip(*ends, strict=True)
             for column, part in zip(triple, ("5 %", "50 %", "95 %"), strict=True)
         ]
-    return {name: columns for name, columns in shown.items() if columns or name not in commands}
+    return {name: columns for name, columns in shown.items() if columns or name not in _COMMANDS}
 
 
 def _below(column: PathColumn, text: str) -> PathColumn:
@@ -276,7 +273,7 @@ def _print_columns(
 # Rows
 
 
-def shown_rows(path: EquilibriumPath, *, every_row: bool = False) -> tuple[list[int], int]:
+def shown_rows(path: EquilibriumPath, *, every_row: bool) -> tuple[list[int], int]:
     """Return the steps to show and the stride between them.
 
     Args:

@@ -148,8 +148,8 @@ def read_data(
     file: str,
     robot: Robot,
     path: bool | None,
-    measured_as: Literal["ring", "edge"] = "ring",
-    columns: Sequence[tuple[str, str]] = (),
+    measured_as: Literal["ring", "edge"],
+    columns: Sequence[tuple[str, str]],
 ) -> Measurements:
     """Read measurements, and write how the rows were interpreted and what was not used.
 

@@ -55,11 +55,13 @@ def material_cards(material: Material) -> str:
         case Linear():
             strain = stress = np.zeros(0)
         case Superelastic():
-            first, slope = material.transition_strain, material.superelastic_modulus
-            strain, stress = _plateau(modulus, first, slope)
+            strain, stress = _plateau(
+                modulus, material.transition_strain, material.superelastic_modulus
+            )
         case Nitinol():
-            first, slope = material.plateau_stress / modulus, material.plateau_modulus
-            strain, stress = _plateau(modulus, first, slope)
+            strain, stress = _plateau(
+                modulus, material.plateau_stress / modulus, material.plateau_modulus
+            )
         case StressStrain():
             strain, stress = map(np.array, material.in_tension)
         case _:

@@ -173,8 +173,9 @@ def _pattern_page(pattern: FlatPattern) -> DrawingPage:
     scale = usual_scale(min((right - left - _AXIS) / wide, (top - low - 2.0 * _AXIS) / high))
     page.scale, wide, high = scale_text(scale), scale * wide, scale * high
     left, top = left + _AXIS + 0.5 * (right - left - _AXIS - wide), top - 0.1
-    limits = {"xlim": (min(x), max(x)), "ylim": (min(y), max(y))}
-    axes = page.inset(left, top - high, left + wide, top, **limits)
+    axes = page.inset(
+        left, top - high, left + wide, top, xlim=(min(x), max(x)), ylim=(min(y), max(y))
+    )
     for line in lines:
         closing = line.points[:1] if line.closed else ()
         axes.plot(*zip(*line.points, *closing, strict=True), clip_on=False, **_LOOKS[line.layer])

@@ -252,7 +252,7 @@ def _drives(model: JointModel) -> str:
         </sensor>"""
 
 
-def urdf(model: JointModel, head: str = "") -> str:
+def urdf(model: JointModel, head: str) -> str:
     """Return the text of a URDF file.
 
     Args:

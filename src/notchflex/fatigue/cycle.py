@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -125,7 +125,7 @@ class StrainCycle(Displayed):
                 f"{self.limit.line} was measured on superelastic nitinol; the material of notch "
                 f"{', '.join(others)} is another one."
             )
-        at, used = facts.get("temperature"), " and ".join(f"{one:g}" for one in self.temperatures)
+        at, used = facts.get("temperature"), " and ".join(map("{:g}".format, self.temperatures))
         if at is not None and {*self.temperatures} - {at}:
             warnings.append(f"the robot is at {used} deg C, and the limit line is for {at:g}.")
         return warnings
@@ -144,13 +144,15 @@ class StrainCycle(Displayed):
 def line_words(limit: Fatigue) -> list[str]:
     """Return what is known of a limit line, each in words."""
     facts, words = limit.facts, [limit.line] if limit.line else []
-    if facts.get("cycles") is not None:
-        words.append(f"{facts['cycles']:.3g} cycles")
-    if facts.get("reliability") is not None:
-        words.append(f"{100.0 * facts['reliability']:g} % survive")
-    if facts.get("temperature") is not None:
-        words.append(f"{facts['temperature']:g} deg C")
-    return [*words, *(facts[key] for key in ("surface", "source") if facts.get(key) is not None)]
+    forms: dict[str, Callable[[Any], str]] = {
+        "cycles": "{:.3g} cycles".format,
+        "reliability": lambda part: f"{100.0 * part:g} % survive",
+        "temperature": "{:g} deg C".format,
+        "surface": str,
+        "source": str,
+    }
+    known = (form(facts[key]) for key, form in forms.items() if facts.get(key) is not None)
+    return [*words, *known]
 
 
 def strain_cycle(
@@ -211,11 +213,11 @@ def strain_cycle(
     line = limit_line(chosen, robot)
     factor = np.ones(len(mean)) if line is None else np.asarray(line.corner_factor)
     margin: Any = np.full_like(mean, np.nan) if line is None else line.margin(mean, amplitude)
-    used = (
+    used: Any = (
         getattr(material, "used_at", None) if load.temperature is None else load.temperature
         for path in paths for load in path.load.different for material in robot.materials[1:]
     )  # fmt: skip
-    temperatures = tuple(sorted({one for one in used if one is not None}))
+    temperatures = tuple(sorted({*used} - {None}))
     failed = [reason for path in paths for reason in path.reason if reason]
     reason = (*failed, reason)[0]
     return StrainCycle(robot, chosen, mean, amplitude, margin, factor, temperatures, loops, reason)

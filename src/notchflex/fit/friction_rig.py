@@ -192,11 +192,11 @@ class FrictionReadings:
         [0.0899, 0.0955]
     """
 
-    weight_1: NDArray[np.float64]
-    weight_2: NDArray[np.float64]
-    turn_1: NDArray[np.float64]
-    turn_2: NDArray[np.float64]
-    deviation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    weight_1: Numbers
+    weight_2: Numbers
+    turn_1: Numbers
+    turn_2: Numbers
+    deviation: Numbers = field(default_factory=lambda: np.zeros(0))
     law: Law = "capstan"
     source: str = "readings"
     lines: tuple[int, ...] = ()
@@ -239,7 +239,7 @@ class FrictionReadings:
     @property
     def values(self) -> Numbers:
         """Weights and turns, (4, N)."""
-        return np.stack([self.weight_1, self.weight_2, self.turn_1, self.turn_2])
+        return np.stack([getattr(self, name) for name in COLUMNS])
 
     def at(self, reading: int) -> str:
         """Return where a reading (from 0) stands, for messages."""
@@ -325,15 +325,13 @@ def read_friction_rig(
             deviations = table.numbers(spread, may_miss=True)
             check_deviation(table, spread, deviations)
             deviation[:, number] = deviations / scale
-    used = [*COLUMNS.values(), *map(deviation_header, COLUMNS.values())]
-    ignored = table.unused(used)
     return FrictionReadings(
         **values,
         deviation=deviation,
         law=law,
         source=table.name,
         lines=table.lines,
-        ignored=ignored,
+        ignored=table.unused([*COLUMNS.values(), *map(deviation_header, COLUMNS.values())]),
     )
 
 

@@ -96,7 +96,7 @@ def _rest(x: Design, y: Vector, known: Vector) -> float:
     return float(peak.x)
 
 
-def mean_interval(y: Vector, variance: Vector, level: float = 0.95) -> tuple[float, float]:
+def mean_interval(y: Vector, variance: Vector) -> tuple[float, float]:
     """Return the profile-likelihood interval of the mean of numbers with known variances.
 
     Its bound makes it exact if no errors are known (Student's interval); it tends to that of
@@ -105,13 +105,13 @@ def mean_interval(y: Vector, variance: Vector, level: float = 0.95) -> tuple[flo
     best = fit_line(np.ones((len(y), 1)), y, variance)
     mean = float(best.values[0])
     if len(y) == 1:
-        quantile = float(norm.ppf(0.5 + 0.5 * level))
+        quantile = float(norm.ppf(0.975))
         half = quantile * float(np.sqrt(variance[0])) if variance[0] > 0.0 else float("nan")
         return mean - half, mean + half
     if np.isinf(best.log_likelihood):
         return mean, mean
     freedom = len(y) - 1
-    quantile = float(student.ppf(0.5 + 0.5 * level, freedom))
+    quantile = float(student.ppf(0.975, freedom))
     bound = 0.5 * len(y) * np.log1p(quantile**2 / freedom)
     no_columns = np.zeros((len(y), 0))
 

@@ -249,7 +249,7 @@ def row_commands(
     load: LoadPath,
     steps: Int[np.ndarray, "k s"],
     chain: Chain,
-    tip: Float[np.ndarray, "all 6"] | None = None,
+    tip: Float[np.ndarray, "all 6"] | None,
     *,
     draws: bool,
 ) -> Command:
@@ -307,9 +307,8 @@ def _check(external: ExternalLoad, robot: Robot) -> None:
                 f"there is no body {force.body}; {robot.name} has the bodies 0 (the base) to "
                 f"{last}, one after each notch"
             )
-    pulls = external.gravity is not None and any(external.gravity)
     masses = external.tip_mass, *(notch.mass for notch in robot.notches)
-    if pulls and robot.densities is None and not any(masses):
+    if any(external.gravity or ()) and robot.densities is None and not any(masses):
         raise InputError.UNSUPPORTED(
             f"gravity has nothing to act on: the density of {robot.name} is not known and no mass "
             "hangs at its tip or stands in it; give material.density (kg/m3) or a tip_mass (g)"
@@ -319,7 +318,7 @@ def _check(external: ExternalLoad, robot: Robot) -> None:
 _Force = tuple[int, Sequence[float], Sequence[float], Sequence[float], bool, bool]
 
 
-def _forces(external: ExternalLoad, last: int, at_tip: Sequence[Any] = ()) -> Iterator[_Force]:
+def _forces(external: ExternalLoad, last: int, at_tip: Sequence[Any]) -> Iterator[_Force]:
     """List all loads but weight: body, force, moment, point, if it follows, if at the tip."""
     # Points at the tip are relative to it. Six more components of force and moment there may be
     # arrays, of many loads.

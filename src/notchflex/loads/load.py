@@ -241,9 +241,12 @@ class ExternalLoad:
         """Whether no load acts, whatever the robot weighs."""
         # Gravity acts where it is given and not zero, or assumed for a mass at the tip.
         pulls = self.tip_mass > 0.0 if self.gravity is None else any(self.gravity)
-        acting = pulls or any(self.tip_force) or any(self.tip_moment)
-        return not (acting or self.temperature is not None) and not any(
-            any(load.force) or any(load.moment) for load in self.body_forces
+        return not (
+            pulls
+            or any(self.tip_force)
+            or any(self.tip_moment)
+            or self.temperature is not None
+            or any(any(load.force) or any(load.moment) for load in self.body_forces)
         )
 
     @property

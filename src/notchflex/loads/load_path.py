@@ -213,7 +213,7 @@ class LoadPath(ByValue, Displayed):
                 f"`{name}` has no effect: every load gives a temperature of its own; leave "
                 "`temperature` out of the loads to vary that of the robot.",
                 name,
-                float(given[0] or 0.0),
+                given[0] or 0.0,
                 None,
             )
             for name in names
@@ -449,9 +449,11 @@ def external_words(load: ExternalLoad) -> list[str]:
         (load.tip_mass, f"tip mass {short(load.tip_mass)} g{where_of_mass}"),
         (any(load.gravity or ()), f"gravity {vector(load.gravity or ())} m/s²"),
         (load.temperature is not None, f"temperature {short(load.temperature or 0.0)} °C"),
+        (
+            load.sheath_bend_deg is not None,
+            f"sheath bent by {short(load.sheath_bend_deg or 0)} deg",
+        ),
     ]
-    if load.sheath_bend_deg is not None:
-        words.append((True, f"sheath bent by {short(load.sheath_bend_deg)} deg"))
     for force in load.body_forces:
         point = f" at {vector(force.point)} mm" if any(force.point) else ""
         body = f"on body {force.body}"

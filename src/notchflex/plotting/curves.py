@@ -277,8 +277,9 @@ def path_panels(path: EquilibriumPath, bands: Mapping[str, Band] | None) -> list
         level, name = 100.0 * allowed, f"allowed {100.0 * allowed:.3g} %"
         limits.append(Span("y", level, VERMILLION, DASHED, 1.2, name=name))
     label = f"{QUANTITIES['peak_strain'].title} of every notch [%]"
-    style: dict[str, Any] = {"y_label": label, "from_zero": True, "legend": INSIDE}
-    strain = load_panel(path, "peak_strain", bands, limits, **style)
+    strain = load_panel(
+        path, "peak_strain", bands, limits, y_label=label, from_zero=True, legend=INSIDE
+    )
     # The curves of the notches have their names in the panel of the angles.
     items = [replace(item, name="") if item.group else item for item in strain.items]
     panels.append(replace(strain, items=items))

@@ -445,45 +445,36 @@ def _side_view(row: NotchRow) -> Iterator[Mark]:
 def _section_view(row: NotchRow) -> Iterator[Mark]:
     """Yield the cross-section as seen from the tip, with the bend upward."""
     radius, outer, inner = row.tube.outer_radius, row.outer, row.inner
-    if isinstance(row.notch, RodGap):
-        yield from _backbone_section(row, row.notch)
+    yield Area([_arc(outer)], _FINE, 1.0, 0.6, face=_BEYOND)
+    yield Area([_arc(inner)], _FINE, 1.0, 0.6, face="white")
+    if isinstance(gap := row.notch, RodGap):
+        for size, face in ((gap.diameter, BLUE), (gap.inner_diameter, "white")):
+            if size:
+                yield Area([_arc(0.5 * row.scale * size)], INK, 1.0, 0.8, face=face)
+        yield from _around(row, [])
         return
     half = math.acos(-row.section[1] / radius)
     level = math.cos(half) * outer / inner  # of a straight edge, in radii of the bore
     half_inner = half if row.radial else math.acos(min(max(level, -1.0), 1.0))
-    part = np.linspace(-1.0, 1.0, 121)
-
-    def arc(size: float, most: float) -> Any:
-        return size * np.column_stack([np.sin(most * part), -np.cos(most * part)])
-
-    yield Area([arc(outer, math.pi)], _FINE, 1.0, 0.6, face=_BEYOND)
-    yield Area([arc(inner, math.pi)], _FINE, 1.0, 0.6, face="white")
-    ring = arc(outer, half)
+    ring = _arc(outer, half)
     if row.radial or level < 1.0:  # else less than the wall is left
-        ring = np.concatenate([ring, arc(inner, half_inner)[::-1]])
+        ring = np.concatenate([ring, _arc(inner, half_inner)[::-1]])
     yield Area([ring], INK, 1.0, 0.8, face=BLUE)
     # The dimension of the angle of what remains.
-    edge = arc(outer + 0.12, half)
+    edge = _arc(outer + 0.12, half)
     yield _stroke(edge, width=0.7)
     yield from (_arrow(edge[8], edge[0]), _arrow(edge[-9], edge[-1]))
-    for way in arc(1.0, half)[[0, -1]]:
+    for way in _arc(1.0, half)[[0, -1]]:
         yield _stroke(np.outer([outer + 0.02, outer + 0.17], way))
     angle, length = math.degrees(2.0 * half), 2.0 * half * radius
     words = f"remaining arc {angle:.4g}°, {length:.4g} at the outer surface"
     yield from _around(row, [words])
 
 
-def _backbone_section(row: NotchRow, gap: RodGap) -> Iterator[Mark]:
-    """Yield the disk behind a backbone, and the backbone."""
-    turns = np.linspace(0.0, 2.0 * math.pi, 121)
-    circle = np.column_stack([np.cos(turns), np.sin(turns)])
-    yield Area([row.outer * circle], _FINE, 1.0, 0.6, face=_BEYOND)
-    yield Area([row.inner * circle], _FINE, 1.0, 0.6, face="white")
-    half = 0.5 * row.scale
-    for size, face in ((gap.diameter, BLUE), (gap.inner_diameter, "white")):
-        if size:
-            yield Area([half * size * circle], INK, 1.0, 0.8, face=face)
-    yield from _around(row, [])
+def _arc(size: float, most: float = math.pi) -> Array:
+    """Return points of an arc, from its lowest point to an angle on both sides; else a circle."""
+    turns = most * np.linspace(-1.0, 1.0, 121)
+    return size * np.column_stack([np.sin(turns), -np.cos(turns)])
 
 
 def _around(row: NotchRow, words: Iterable[str]) -> Iterator[Mark]:

@@ -103,8 +103,17 @@ def comparison_picture(
             items += [replace(entry, points=computed[run]) for run in runs]
         name = f"notch {column + 1}" if column < len(errors) - 1 else "total"
         title = f"{name}, error {float(error) * DEGREES:.2f}° rms"
-        style: dict[str, Any] = {"title": title, "legend": "", "from_zero": True, "shared": "x"}
-        panels.append(Panel(items, x_label, "angle [deg]", **style))
+        panels.append(
+            Panel(
+                items,
+                x_label,
+                "angle [deg]",
+                title=title,
+                legend="",
+                from_zero=True,
+                shared="x",
+            )
+        )
     panels.append(_centre_lines(comparison))
     if others:
         panels.append(_errors(models, [entry.colour for entry in entries]))
@@ -287,8 +296,17 @@ def _data_marks(fit: Calibration, quantity: str, shown: Any, x: Array) -> Iterat
                 of_pull = residuals.pull[rows] == pull
                 name = f"{_MEASURED}, pull {seen.pull[residuals.row[rows][of_pull][0]]}"
                 points = np.stack([x[rows], measured], axis=1)[of_pull]
-                style: dict[str, Any] = {"marker": MARKERS[pull % len(MARKERS)], "hollow": True}
-                yield dots(points, GREY, 3.2, name=name, group=_MEASURED, layer=4, **style)
+                marker = MARKERS[pull % len(MARKERS)]
+                yield dots(
+                    points,
+                    GREY,
+                    3.2,
+                    name=name,
+                    group=_MEASURED,
+                    layer=4,
+                    marker=marker,
+                    hollow=True,
+                )
 
 
 def _likelihood_panel(fit: Calibration, name: str) -> Panel:

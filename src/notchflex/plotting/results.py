@@ -117,8 +117,7 @@ def batch_picture(
         table = values.reshape(rows, -1) * quantity.scale
         table = np.where(converged[:, None], table, np.nan)[order]
         if np.isfinite(table).any():
-            style = {"width": 0.8, "marker": "o", "size": 2.0}
-            items = entry_lines(x[order], table, *quantity.per, **style)
+            items = entry_lines(x[order], table, *quantity.per, width=0.8, marker="o", size=2.0)
             panels.append(Panel(items, label, quantity.label))
     if "tip_position" in last:
         tips = last["tip_position"][:, [0, 2]]

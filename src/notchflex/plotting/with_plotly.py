@@ -93,8 +93,7 @@ def save_html(picture: Sheet, target: str | FilePath) -> None:
     """
     config = {"displaylogo": False, "responsive": True, "toImageButtonOptions": {"format": "svg"}}
     # With a fixed name of the element the same picture gives the same file.
-    options: dict[str, Any] = {"div_id": "notchflex", "default_width": "100%", "config": config}
-    text = interactive_of(picture).to_html(**options)
+    text = interactive_of(picture).to_html(div_id="notchflex", default_width="100%", config=config)
     # It shrinks with its window to three quarters of its width; below it is scrolled.
     narrowest = round(0.75 * INCH * picture.size[0])
     head = f"<head><title>{escape(picture.title)}</title>"

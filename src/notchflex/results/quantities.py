@@ -39,7 +39,7 @@ def commanded_stroke(path: EquilibriumPath) -> np.ndarray:
 
 
 @Quantity("path", "temperature", r"\vartheta", "deg C", column="temperature_C",
-          after="commanded_stroke", optional=lambda path: _given(path, "temperature")
+          after="commanded_stroke", optional=lambda path: np.isfinite(path.temperature).any()
           )  # fmt: skip
 def temperature(path: EquilibriumPath) -> np.ndarray:
     """Temperature of the robot as a load; empty (NaN) where it is that of the robot file."""
@@ -47,7 +47,8 @@ def temperature(path: EquilibriumPath) -> np.ndarray:
 
 
 @Quantity("path", "bend of the sheaths", r"\theta_\mathrm{s}", "deg", column="sheath_bend_deg",
-          after="temperature", optional=lambda path: _given(path, "sheath_bend_deg"))  # fmt: skip
+          after="temperature", optional=lambda path: np.isfinite(path.sheath_bend).any()
+          )  # fmt: skip
 def sheath_bend(path: EquilibriumPath) -> np.ndarray:
     """Total bend of all sheaths as a load; empty (NaN) where it is that of the robot file."""
     return np.radians(_of_load(path, "sheath_bend_deg"))
@@ -56,11 +57,6 @@ def sheath_bend(path: EquilibriumPath) -> np.ndarray:
 def _of_load(path: EquilibriumPath, name: str) -> np.ndarray:
     """Return a number of the external load of every step; NaN where it is not given."""
     return np.array([getattr(load, name) for load in path.load.external], float)
-
-
-def _given(path: EquilibriumPath, name: str) -> bool:
-    """Return whether the external load of any step gives a number."""
-    return not np.isnan(_of_load(path, name)).all()
 
 
 @Quantity("path", "total chord angle", r"\psi", "deg", key="total_chord_angle_deg",

@@ -68,8 +68,7 @@ class Fatigue:
 
     def conflicts(self) -> Problems:
         """Find a line that is given twice or by half, and means that do not rise."""
-        own = {key: getattr(self, key) for key in LINES["cao2020"]}
-        given = [key for key, value in own.items() if value is not None]
+        given = [key for key in LINES["cao2020"] if getattr(self, key) is not None]
         if self.line is not None and given:
             yield "line", f'is "{self.line}", which has its own `{given[0]}`; give one of the two.'
         if self.corner_factor is not None and self.corner_radius is not None:

@@ -225,10 +225,9 @@ class SensingModel:
         at_once = self.load(rows, forces)
         middle = self.unknown.load(forces.mean(axis=0))
         halves = LoadPath.of_valid(
-            np.stack([at_once.tension.mean(axis=0), at_once.tension[1]]),
-            np.stack([at_once.stroke.mean(axis=0), at_once.stroke[1]]),
-            at_once.base_rotation,
-            (middle, at_once.external[1]),
+            *(np.stack([way.mean(axis=0), way[1]]) for way in (at_once.tension, at_once.stroke)),
+            base_rotation=at_once.base_rotation,
+            external=(middle, at_once.external[1]),
         )
         ways = [self._along.solve(self.robot, halves, start), self.solve(start, number, forces[1:])]
         first, second = (self.values(way)[-1] for way in ways)
@@ -293,12 +292,11 @@ class SensingModel:
 
     def _moved_by_force(self, path: EquilibriumPath) -> list[LoadPath]:
         """The loads of a path with a unit more of each component in every step."""
-        body = self.unknown.body
-        loads: list[LoadPath] = []
-        for direction in self.unknown.directions:
-            external = tuple(added_force(one, direction, body) for one in path.load.external)
-            loads.append(replace(path.load, external=external))
-        return loads
+        load, body = path.load, self.unknown.body
+        return [
+            replace(load, external=tuple(added_force(one, unit, body) for one in load.external))
+            for unit in self.unknown.directions
+        ]
 
     def _moved_by_drives(self, path: EquilibriumPath) -> list[LoadPath]:
         """The loads of a path with a unit more of what drives each tendon in every step."""

@@ -9,7 +9,7 @@ known: what each says of it is in `own_reading`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import astuple, dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -169,13 +169,10 @@ def readings_of(
             f"a history has at most {MAX_READINGS} readings; got {rows}. Leave out readings "
             "between the points where a tendon reverses"
         )
-    whole = {
-        name: tables.get(name, np.full((rows, width), np.nan))
-        for name, (_, width, _) in columns.items()
-    }
-    readings = Readings(
-        whole["tensions"], whole["strokes"], whole["tip"], whole["angles"], noise, np.ones(rows)
+    whole = (
+        tables.get(name, np.full((rows, width), np.nan)) for name, (_, width, _) in columns.items()
     )
+    readings = Readings(*whole, noise=noise, count=np.ones(rows))
     _check_driven(readings)
     return readings
 
@@ -229,24 +226,16 @@ def merged(readings: Readings) -> tuple[Readings, Int[np.ndarray, " s"]]:
     """
     noise = readings.noise
     tables = [readings.tension, readings.stroke, readings.tip, readings.angles]
-    deviations = np.repeat(
-        [noise.tension, noise.stroke, noise.tip, noise.angle], [table.shape[1] for table in tables]
-    )
+    deviations = np.repeat(astuple(noise), [table.shape[1] for table in tables])
     values = np.concatenate(tables, axis=1)
     group = np.zeros(len(values), int)
-    total, size = values[0].copy(), 1
+    total, size = values[0], 1
     for number, row in enumerate(values[1:], 1):
-        apart = np.abs(row - total / size)
-        same_sensors = np.array_equal(np.isnan(row), np.isnan(total))
-        if same_sensors and not (apart > _SAME * deviations * np.sqrt(1.0 + 1.0 / size)).any():
-            total, size = total + row, size + 1
-            group[number] = group[number - 1]
-        else:
-            total, size = row.copy(), 1
-            group[number] = group[number - 1] + 1
+        far = np.abs(row - total / size) > _SAME * deviations * np.sqrt(1.0 + 1.0 / size)
+        is_same = np.array_equal(np.isnan(row), np.isnan(total)) and not far.any()
+        total, size = (total + row, size + 1) if is_same else (row, 1)
+        group[number] = group[number - 1] + (not is_same)
     count = np.bincount(group)
     rows = np.split(np.arange(len(group)), np.cumsum(count)[:-1])
-    tension, stroke, tip, angles = (
-        np.array([table[some].mean(axis=0) for some in rows]) for table in tables
-    )
-    return Readings(tension, stroke, tip, angles, noise, count.astype(float)), group
+    means = (np.array([table[some].mean(axis=0) for some in rows]) for table in tables)
+    return Readings(*means, noise=noise, count=count.astype(float)), group

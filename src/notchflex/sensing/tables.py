@@ -27,8 +27,8 @@ BESIDE = ("tip", "angles")
 def read_sensor_table(
     file: str,
     robot: Robot,
-    beside: Collection[str] = (),
-    named: Mapping[str, str] | None = None,
+    beside: Collection[str],
+    named: Mapping[str, str],
 ) -> dict[str, np.ndarray]:
     """Read tensions and strokes of a table, one row a reading; empty entries were not measured.
 
@@ -100,15 +100,21 @@ def sensed_columns(sensed: SensedForce) -> dict[str, Any]:
 def sensed_document(sensed: SensedForce) -> dict[str, Any]:
     """Return what was sensed as a document of plain values and arrays, for JSON."""
     names = sensed.components
+    by_component = {
+        "force_N": sensed.force,
+        "low_N": sensed.low,
+        "high_N": sensed.high,
+        "limited": sensed.limited,
+        "stuck": sensed.stuck,
+    }
     readings = [
         {
             "reading": number + 1,
             "converged": bool(sensed.converged[number]),
-            "force_N": dict(zip(names, sensed.force[number], strict=True)),
-            "low_N": dict(zip(names, sensed.low[number], strict=True)),
-            "high_N": dict(zip(names, sensed.high[number], strict=True)),
-            "limited": dict(zip(names, sensed.limited[number].tolist(), strict=True)),
-            "stuck": dict(zip(names, sensed.stuck[number].tolist(), strict=True)),
+            **{
+                key: dict(zip(names, values[number].tolist(), strict=True))
+                for key, values in by_component.items()
+            },
             "covariance_N2": sensed.covariance[number],
             "contact": bool(sensed.contact[number]),
             "contact_p": float(sensed.contact_probability[number]),

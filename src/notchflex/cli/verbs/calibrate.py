@@ -304,7 +304,7 @@ def calibrate(
     def show(fit: Calibration) -> None:
         print_calibration(fit)
         for key, document in analyses.items():
-            _PRINTERS[key](document)
+            _ANALYSES[key][1](document)
 
     outputs.write(fit, lambda fit: fitting.calibration_document(fit) | analyses, show)
     for problem in problems:
@@ -354,7 +354,7 @@ def _analyse(
         try:
             documents[key] = analysis()
         except InputError as problem:
-            problems.append(f"{_OPTIONS[key]}: {problem}")
+            problems.append(f"{_ANALYSES[key][0]}: {problem}")
     return documents, problems
 
 
@@ -438,9 +438,8 @@ def _print_posterior(document: dict[str, Any]) -> None:
     tables.show(document["constants"], forms=forms | {"effective_draws": ".0f"})
 
 
-_OPTIONS = {"left_out": "--leave-out", "next_measurement": "--next", "posterior": "--posterior"}
-_PRINTERS = {
-    "left_out": _print_left_out,
-    "next_measurement": _print_next,
-    "posterior": _print_posterior,
+_ANALYSES = {
+    "left_out": ("--leave-out", _print_left_out),
+    "next_measurement": ("--next", _print_next),
+    "posterior": ("--posterior", _print_posterior),
 }

@@ -48,18 +48,17 @@ def design(
             "--front is of robots as drawn, with any length: leave out --grid and --robust, name "
             "the point that you choose as `robot` of the design file, and run it again with them."
         )
-    if front:
-        with terminal.progress("spreading over the front") as progress:
-            points = designing.design_front(spec, progress=progress)
-        if output is not None:
-            terminal.note_written(points.save(output, inputs=[spec]))
-        outputs.write(points, _front_document, _print_front)
-        reason = points.reason
-    else:
-        with terminal.progress("ranking robots") as progress:
+    with terminal.progress("spreading over the front" if front else "ranking robots") as progress:
+        if front:
+            result = designing.design_front(spec, progress=progress)
+        else:
             result = designing.design(spec, robust=robust, grid=grid, progress=progress)
-        if output is not None:
-            terminal.note_written(result.save(output, inputs=[spec]))
+    if output is not None:
+        terminal.note_written(result.save(output, inputs=[spec]))
+    if isinstance(result, designing.DesignFront):
+        outputs.write(result, _front_document, _print_front)
+        reason = result.reason
+    else:
         outputs.write(result, designing.design_document, _print)
         reason = "" if result.converged else result.reason
     return terminal.failed(f"{reason}.") if reason else DONE

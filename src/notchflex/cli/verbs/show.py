@@ -91,11 +91,15 @@ def show(
 
 def _at_temperatures(robot: Robot) -> Iterator[dict[str, Any]]:
     """Yield plateaus and closing tensions in the workshop and in the body, where they are known."""
+    import numpy as np
+
     from notchflex import closing
 
-    parts = {"": robot, **{f"notch[{i}].": one for i, one in enumerate(robot.notches, start=1)}}
-    places = [
-        f"{place}material.temperature" for place, part in parts.items() if _warms(part.material)
+    places = ["material.temperature"] * _warms(robot.material)
+    places += [
+        f"notch[{number}].material.temperature"
+        for number, notch in enumerate(robot.notches, start=1)
+        if _warms(notch.material)
     ]
     for temperature in (22.0, 37.0) if places else ():
         try:
@@ -103,16 +107,15 @@ def _at_temperatures(robot: Robot) -> Iterator[dict[str, Any]]:
         except InputError as problem:
             terminal.warn(f"{problem}")
             continue
-        tension, alike = closing(warm).tension.tolist(), dict[Any, list[int]]()
-        for index, notch in enumerate(warm.notches):
-            alike.setdefault(notch.made_of(warm.material), []).append(index)
-        for material, members in alike.items():
-            if _warms(material):
-                of = {"notches": ", ".join(str(k + 1) for k in members)} if len(alike) > 1 else {}
-                row = zip(("plateau_MPa", "lower_plateau_MPa"), material.plateaus, strict=False)
-                closes = [tension[k] for k in members if not math.isnan(tension[k])]
-                ends = [function(closes, default=math.nan) for function in (min, max)]
-                yield {"temperature_C": temperature, **of, **dict(row), "closing_tension_N": ends}
+        tension = closing(warm).tension
+        materials = [notch.made_of(warm.material) for notch in warm.notches]
+        different = dict.fromkeys(materials)
+        for material in filter(_warms, different):
+            members = [k for k, other in enumerate(materials) if other == material]
+            of = {"notches": ", ".join(str(k + 1) for k in members)} if len(different) > 1 else {}
+            row = zip(("plateau_MPa", "lower_plateau_MPa"), material.plateaus, strict=False)
+            ends = [function.reduce(tension[members]) for function in (np.fmin, np.fmax)]
+            yield {"temperature_C": temperature, **of, **dict(row), "closing_tension_N": ends}
 
 
 def _warms(material: Any) -> bool:

@@ -104,13 +104,12 @@ def _commands(measurements: Measurements) -> Numbers:
     load = measurements.load
     external: list[list[float]] = []
     for external_load in load.external:
-        gravity = external_load.gravity or (0.0, 0.0, 0.0)
         row = [
             *external_load.tip_force,
             *external_load.tip_moment,
             *external_load.tip_point,
             *external_load.weight(external_load.tip_mass),
-            *gravity,
+            *(external_load.gravity or (0.0, 0.0, 0.0)),
             external_load.temperature or 0.0,
             -1.0 if external_load.sheath_bend_deg is None else external_load.sheath_bend_deg,
         ]
