@@ -258,16 +258,16 @@ def _beside_strip(
     radii, cuts = xp.array([[tube.outer_radius], [tube.inner_radius]]), layout.cuts
     earlier = before and before.cut_layout(tube, None, notch)
     if earlier:  # its last cut may reach beyond its own length
-        cuts += tuple(cut.moved(-earlier.length) for cut in earlier.cuts)
+        cuts += (earlier.cuts[-1].moved(-earlier.length),)
 
     def left(low: Any, high: Any) -> Array:
         moments = np.pi * radii**2 * xp.stack([high - low, 0.5 * (high - low) ** 2])
         for cut in cuts:
             places, heights = xp.array(cut.corners).T
             start, end = places[0], places[-1]
-            along, weights = gauss_on(*xp.clip(xp.stack([start, end]), low, high), 40)
-            passed = (along - places[:-1, None]) / xp.maximum(xp.diff(places), 1e-99)[:, None]
-            bottom = heights[0] + xp.diff(heights) @ xp.clip(passed, 0.0, 1.0)
+            along, weights = gauss_on(xp.clip(start, low, high), xp.clip(end, low, high), 24)
+            passed = (along[:, None] - places[:-1]) / xp.maximum(xp.diff(places), 1e-99)
+            bottom = heights[0] + xp.clip(passed, 0.0, 1.0) @ xp.diff(heights)
             # Beside its ends the bottom of a cut rises by the rounding of its corners.
             radius = xp.array(cut.radii).max()
             inside = xp.maximum(radius - xp.minimum(along - start, end - along), 0.0)
@@ -275,7 +275,7 @@ def _beside_strip(
             # Beyond that chord lies a segment of a circle less one of the bore.
             angle = half_angle(radii, radii - bottom, radii + bottom)
             removed = radii**2 * (angle - 0.5 * xp.sin(2.0 * angle)) * weights
-            moments = moments - removed @ xp.stack([xp.ones(40), along - low], axis=1)
+            moments = moments - xp.stack([removed.sum(-1), removed @ (along - low)], axis=1)
         return moments[0] - moments[1]
 
     face = layout.length - notch.spacing(after)
