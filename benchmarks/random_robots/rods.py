@@ -22,7 +22,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 import notchflex as nf
 from notchflex.robot.cuts import NotchCut
 
-from .arcs import BALANCE, POSE, ArcLaw, bending
+from .arcs import BALANCE, POSE, TURNED, ArcLaw, bending
 from .forces import State, about_z, height_of
 from .rings import Ends
 from .sections import left_by, memory_of, round_section
@@ -46,9 +46,9 @@ _NUDGE = 1e-6
 _SMALL = 2e-3
 # What a rigid direction may give, rad and of the length: rounding of poses.
 _RIGID = 1e-9
-# By how much more a balance may miss, at 1 rad in a plane, and about two axes; strains, and a pose,
-# about two axes (rad), and the latter at most.
-_SHARP, _SEVERAL, _TURNED, _POSED, _MOST = 30.0, 300.0, 5e-6, 2.5e-5, 1e-5
+# By how much more a balance may miss, at 1 rad in a plane, and about two axes; a pose about two
+# axes (rad), and at most.
+_SHARP, _SEVERAL, _POSED, _MOST = 30.0, 300.0, 2.5e-5, 1e-5
 # rad, what is no bending out of a plane
 _FLAT = 1e-9
 
@@ -339,7 +339,7 @@ def _added_up(state: State, i: int, fits: Backbones, k: int, bends: np.ndarray) 
     missing = np.abs(rigid * (fits.moves[k] - _Z) - _WEIGHS @ forces)
     # Of a thin one even rounding of the poses, and of the integral, is a large force.
     seen = rigid * (
-        1e-12 * (1.0 + state.reach / length) + 4e-7 * (angle**4 + angle**6) + _TURNED * several
+        1e-12 * (1.0 + state.reach / length) + 4e-7 * (angle**4 + angle**6) + TURNED * several
     )
     for direction, what in enumerate(("shear", "shear sideways", "stretch")):
         out = not missing[direction] < balance * pulled + seen[direction]
