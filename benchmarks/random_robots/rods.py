@@ -371,8 +371,8 @@ def taken(cut: NotchCut, tube: nf.Tube, end: float) -> float:
 def masses(state: State) -> list[str]:
     """Whether all weighs what the robot says: the sum, and of straight backbones its moment.
 
-    Of strips across the tube it is the tube less its cuts. One may reach into a notch of another
-    kind, which has its own law.
+    Of strips across the tube it is the tube less its cuts; where one of them reaches into a notch
+    that differs, what it takes there is not known.
     """
     robot, chain, mass, first = state.robot, state.path.chain, 0.0, 0.0
     place, rounding, along = 0.0, 1e-9, nf.RodGap | nf.TableNotch | nf.ArcNotch
@@ -391,8 +391,15 @@ def masses(state: State) -> list[str]:
                 cuts = [taken(cut, tube, end) for cut in layouts[i].cuts]
                 own = place + height + state.length[i]
                 over = sum(cuts) - sum(taken(cut, tube, own) for cut in layouts[i].cuts)
-                follows = robot.notches[i] if i < len(robot.notches) else None
-                rounding = max(rounding, 1e-4) + isinstance(follows, along) * over / ring / height
+                # Two cuts that meet there take their share once.
+                follows = robot.notches[i] if i < len(robot.notches) else notch
+                meets = over > 0.0 and not (
+                    follows.kind == notch.kind
+                    and follows.direction_deg == notch.direction_deg
+                    and follows.tube == notch.tube
+                    and follows.height >= notch.height
+                )
+                rounding = max(rounding, 1e-4) + meets * over / ring / height
                 parts.append((-sum(cuts), 0.0, None))
             parts.insert(0, (area * height, height, None))
         for volume, length, given in parts:

@@ -56,23 +56,55 @@ def test_masses_add_up_to_the_tube_without_its_cuts(wrist: nf.Robot):
     assert geometry.body_centre.shape == (6, 3)
 
 
+def solid_of(robot: nf.Robot) -> tuple[float, float]:
+    """Volume of the solid up to the robot's end, mm^3, and its middle along the tube, mm."""
+    whole = straight_solid(robot, cuts_of(robot), SolidOptions())
+    mesh = whole.trim_by_plane((0.0, 0.0, -1.0), -robot.geometry.length).to_mesh()
+    corners = np.asarray(mesh.vert_properties, float)[np.asarray(mesh.tri_verts), :3]
+    volume = np.linalg.det(corners) / 6.0  # of tetrahedra with the origin
+    return volume.sum(), volume @ corners[..., 2].sum(axis=1) / 4.0 / volume.sum()
+
+
+def weighed(robot: nf.Robot) -> tuple[float, float]:
+    """The same of the masses of the bodies."""
+    geometry = robot.geometry
+    assert (geometry.body_mass[1:] > 0.0).all()
+    place = geometry.body_start + geometry.body_centre[:, 2]
+    mass = geometry.body_mass.sum()
+    return mass / (1e-6 * robot.material.density), geometry.body_mass @ place / mass
+
+
 @pytest.mark.parametrize("name", ["liu2022", "gao2017"])
 @pytest.mark.parametrize("uncut", [0.0, 2.0, 4.0])
 @pytest.mark.parametrize("ends", ["rigid", "elastic"])
 def test_strips_weigh_what_their_solid_does(name: str, uncut: float, ends: str):
-    """The sum to the flat sides of the solid, 1e-4; its middle along the tube to 1e-3 mm."""
-    changes = {"notch.ends": ends, "notch.uncut_length": uncut, "material.density": 1e6}
-    robot = nf.load_robot(name).with_values(changes)
-    geometry = robot.geometry
-    whole = straight_solid(robot, cuts_of(robot), SolidOptions())
-    mesh = whole.trim_by_plane((0.0, 0.0, -1.0), -geometry.length).to_mesh()
-    corners = np.asarray(mesh.vert_properties, float)[np.asarray(mesh.tri_verts), :3]
-    volume = np.linalg.det(corners) / 6.0  # of tetrahedra with the origin
-    assert geometry.body_mass.sum() == pytest.approx(volume.sum(), rel=1e-4)
-    assert (geometry.body_mass[1:] > 0.0).all()
-    place = geometry.body_start + geometry.body_centre[:, 2]
-    middle = volume @ corners[..., 2].sum(axis=1) / 4.0 / volume.sum()
-    assert geometry.body_mass @ place / geometry.body_mass.sum() == pytest.approx(middle, abs=1e-3)
+    robot = nf.load_robot(name).with_values({"notch.ends": ends, "notch.uncut_length": uncut})
+    np.testing.assert_allclose(weighed(robot), solid_of(robot), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"notch[2].direction_deg": 180.0},
+        {"notch[2].height": 1.0},
+        {"notch[2].tube": nf.Tube(11.0, 6.0)},
+        {"notch[2].uncut_length": 1.0},
+    ],
+)
+def test_cuts_that_meet_take_their_share_of_the_tube_once(change: dict[str, object]):
+    robot = nf.load_robot("liu2022").with_values({"notch.depth": 5.6, **change})
+    np.testing.assert_allclose(weighed(robot), solid_of(robot), rtol=5e-4)
+
+
+def test_weights_have_slopes_where_triangular_notches_adjoin():
+    """A notch can only get longer there; cuts begin and end at the same places."""
+    robot = nf.load_robot("liu2022").with_value("friction.coefficient", 0.0)
+    load = nf.Load(tension=(0.3, 0.1), gravity=(3.0, 0.0, -9.0))
+    state = nf.solve(robot, load)
+    slope = state.path.jacobian(["notch.uncut_length"], "tip_position")["tip_position"][0]
+    moved = nf.solve(robot.with_value("notch.uncut_length", 1e-5), load)
+    found = (moved.tip_position - state.tip_position) / 1e-5
+    np.testing.assert_allclose(np.ravel(slope), found, rtol=1e-4, atol=1e-8)
 
 
 def test_cuts_stand_where_the_notches_do(wrist: nf.Robot):

@@ -11,6 +11,7 @@ import operator
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,6 +44,7 @@ from notchflex.mechanics.section import FIBRES, fitted, gauss_on, half_angle
 from notchflex.mechanics.sheath import Sheath, build_sheath
 from notchflex.mechanics.tendon import TUBE_AXIS, TendonGroup, route
 from notchflex.robot import Fatigue, Robot, Tendon, Tube
+from notchflex.robot.cuts import NotchCut
 from notchflex.robot.kinds import Notch
 from notchflex.robot.part import unchecked
 
@@ -247,36 +249,55 @@ def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[Array, " bodies"
     return xp.stack(xp.broadcast_arrays(tube.base_length, *spacings))
 
 
-@cached(64)
+@cached(1024)
 def _beside_strip(
-    notch: Notch, tube: Tube, before: Notch | None, after: Notch | None
+    notch: Notch, tubes: tuple[Tube, Tube], before: Notch | None, after: Notch | None
 ) -> Float[Array, "2 2"]:
     """Return volumes, and their moments, of the wall before a strip across the tube and behind."""
-    layout = notch.cut_layout(tube, before, after)
-    if layout is None or notch.is_round or not notch.is_cut or notch.spine_cut is not None:
-        return xp.zeros((2, 2))  # of no strip
-    radii, cuts = xp.array([[tube.outer_radius], [tube.inner_radius]]), layout.cuts
-    earlier = before and before.cut_layout(tube, None, notch)
-    if earlier:  # its last cut may reach beyond its own length
+    if not notch.is_strip:
+        return xp.zeros((2, 2))
+    layout = notch.cut_layout(tubes[1], before, after)
+    assert layout is not None
+    radii, cuts = xp.array([[tubes[1].outer_radius], [tubes[1].inner_radius]]), layout.cuts
+    ring = np.pi * (radii[0, 0] ** 2 - radii[1, 0] ** 2)
+    earlier = before and before.is_strip and before.cut_layout(tubes[0], None, notch)
+    if earlier:  # its last cut may reach into this length of tube
         cuts += (earlier.cuts[-1].moved(-earlier.length),)
 
+    def taken(cut: NotchCut, along: Array) -> Array:
+        """Compute the area that a cut takes of the tube's wall."""
+        places, heights = xp.array(cut.corners).T
+        # A face across the tube is passed where it stands.
+        passed = (along[:, None] - places[:-1] + 1e-99) / xp.maximum(xp.diff(places), 1e-99)
+        bottom = heights[0] + xp.clip(passed, 0.0, 1.0) @ xp.diff(heights)
+        # Beside its ends the bottom of a cut rises by the rounding of its corners.
+        radius = xp.array(cut.radii).max()
+        inside = xp.maximum(radius - xp.minimum(along - places[0], places[-1] - along), 0.0)
+        bottom = bottom + radius - xp.sqrt(xp.maximum(radius**2 - inside**2, 1e-300))
+        # Beyond that chord lies a segment of a circle less one of the bore.
+        angle = half_angle(radii, radii - bottom, radii + bottom)
+        segments = radii**2 * (angle - 0.5 * xp.sin(2.0 * angle))
+        return segments[0] - segments[1]
+
     def left(low: Any, high: Any) -> Array:
-        moments = np.pi * radii**2 * xp.stack([high - low, 0.5 * (high - low) ** 2])
-        for cut in cuts:
-            places, heights = xp.array(cut.corners).T
-            start, end = places[0], places[-1]
-            along, weights = gauss_on(xp.clip(start, low, high), xp.clip(end, low, high), 24)
-            passed = (along[:, None] - places[:-1]) / xp.maximum(xp.diff(places), 1e-99)
-            bottom = heights[0] + xp.clip(passed, 0.0, 1.0) @ xp.diff(heights)
-            # Beside its ends the bottom of a cut rises by the rounding of its corners.
-            radius = xp.array(cut.radii).max()
-            inside = xp.maximum(radius - xp.minimum(along - start, end - along), 0.0)
-            bottom = bottom + radius - xp.sqrt(xp.maximum(radius**2 - inside**2, 1e-300))
-            # Beyond that chord lies a segment of a circle less one of the bore.
-            angle = half_angle(radii, radii - bottom, radii + bottom)
-            removed = radii**2 * (angle - 0.5 * xp.sin(2.0 * angle)) * weights
-            moments = moments - xp.stack([removed.sum(-1), removed @ (along - low)], axis=1)
-        return moments[0] - moments[1]
+        def within(place: Any) -> Any:  # the cut's own end where they are equal, for slopes
+            place = xp.where(place > low, place, low)
+            return xp.where(place > high, high, place)
+
+        moments = ring * xp.stack([high - low, 0.5 * (high - low) ** 2])
+        for number, cut in enumerate(cuts):
+            along, weights = gauss_on(within(cut.corners[0][0]), within(cut.corners[-1][0]), 24)
+            area = taken(cut, along)
+            if number == len(layout.cuts):
+                # What the first cut has taken already: of thin walls exact for cuts from any
+                # sides, of others for those from one side and from opposite ones.
+                other = taken(cuts[0], along)
+                turn = xp.abs((cut.side_deg - cuts[0].side_deg + 180.0) % 360.0 - 180.0) / 180.0
+                both = 0.5 * (area + other)
+                shared = xp.clip(both - 0.5 * ring * turn, 0.0, xp.minimum(area, other))
+                area = area - shared - xp.maximum(both - ring * (1.0 - 0.5 * turn), 0.0)
+            moments = moments - xp.stack([area @ weights, area @ (weights * (along - low))])
+        return moments
 
     face = layout.length - notch.spacing(after)
     return xp.stack([left(0.0, face), left(face, layout.length)])
@@ -303,10 +324,11 @@ def body_masses(
     radii = [(tube.outer_radius, tube.inner_radius) for tube in robot.tubes]
     outer, inner = xp.array(radii).T
     around = (None, *robot.notches, None)
-    walls = xp.stack([*map(_beside_strip, robot.notches, robot.tubes[1:], around, around[2:])])
-    is_strip = walls[:, 1, 0] > 0.0
+    tubes = pairwise(robot.tubes)
+    walls = xp.stack([*map(_beside_strip, robot.notches, tubes, around, around[2:])])
+    is_strip = np.array([notch.is_strip for notch in robot.notches])
     piece = np.pi * (outer**2 - inner**2) * length * relative
-    piece = xp.where(xp.append(False, is_strip), 0.0, piece)
+    piece = xp.where(np.append(False, is_strip), 0.0, piece)
     if any(mass is not None for mass in masses):
         given = [piece[k] if m is None else 1e6 * m / densities[0] for k, m in enumerate(masses)]
         piece = xp.stack(xp.broadcast_arrays(*given))

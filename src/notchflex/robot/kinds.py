@@ -406,6 +406,7 @@ class Notch:
     """
 
     is_round: ClassVar[bool] = False  # whether it bends to all sides alike
+    is_strip: ClassVar[bool] = False  # whether a strip across the tube bends, which its cuts leave
     is_cut: ClassVar[bool] = True  # whether its cuts are known, from which it can be made
     kind: str
     uncut_length: Annotated[

@@ -1,7 +1,7 @@
 """The notch of Liu 2022: two triangular cuts from opposite sides and the strip between them."""
 
 from dataclasses import KW_ONLY
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -70,6 +70,7 @@ class StripNotch(Notch):
     ] = "large"
     _: KW_ONLY
     kind: Literal["strip"] = "strip"
+    is_strip: ClassVar = True
     ends: Annotated[
         Literal["rigid", "elastic"],
         Field(

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import KW_ONLY
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -62,6 +62,7 @@ class ULink(Notch):
     ]
     _: KW_ONLY
     kind: Literal["u-link"] = "u-link"
+    is_strip: ClassVar = True
     ends: Annotated[
         Literal["rigid", "elastic"],
         Field(
