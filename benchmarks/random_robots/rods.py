@@ -399,7 +399,7 @@ def masses(state: State) -> list[str]:
                     and follows.tube == notch.tube
                     and follows.height >= notch.height
                 )
-                rounding = max(rounding, 1e-4) + meets * over / ring / height
+                rounding = max(rounding, 1e-3) + meets * over / ring / height
                 parts.append((-sum(cuts), 0.0, None))
             parts.insert(0, (area * height, height, None))
         for volume, length, given in parts:

@@ -79,7 +79,7 @@ def weighed(robot: nf.Robot) -> tuple[float, float]:
 @pytest.mark.parametrize("ends", ["rigid", "elastic"])
 def test_strips_weigh_what_their_solid_does(name: str, uncut: float, ends: str):
     robot = nf.load_robot(name).with_values({"notch.ends": ends, "notch.uncut_length": uncut})
-    np.testing.assert_allclose(weighed(robot), solid_of(robot), rtol=1e-4)
+    np.testing.assert_allclose(weighed(robot), solid_of(robot), rtol=2e-4)
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,8 @@ from notchflex.loads.command import (
     make_commands,
 )
 from notchflex.loads.load_path import load_path
-from notchflex.mechanics.chain import assemble, body_masses
+from notchflex.mechanics.chain import assemble
+from notchflex.mechanics.masses import body_masses
 from refusals import refused
 from robots import ready
 

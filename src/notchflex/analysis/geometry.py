@@ -14,9 +14,10 @@ from notchflex._jax import constant, jax, jit
 from notchflex._values import read_only
 from notchflex.analysis.kinematics import axis_places, bodies_from_angles, points_on_axis
 from notchflex.errors import InputError
-from notchflex.mechanics.chain import Chain, assemble, body_lengths
+from notchflex.mechanics.chain import Chain, assemble
 from notchflex.mechanics.contact import closing_angles, free_angle
 from notchflex.mechanics.flexure.rod_kinematics import node_poses
+from notchflex.mechanics.masses import body_lengths
 from notchflex.mechanics.tendon import TUBE_AXIS, Holes, holes_of, passage
 from notchflex.results.state import Equilibrium
 from notchflex.robot import Robot

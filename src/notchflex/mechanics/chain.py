@@ -11,7 +11,6 @@ import operator
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,14 +36,14 @@ from notchflex.mechanics.flexure import (
     with_level,
 )
 from notchflex.mechanics.friction import FrictionLaw, friction_law
+from notchflex.mechanics.masses import body_lengths, body_masses
 from notchflex.mechanics.material import Fibres, Law, LimitLine, MixedLaw, section_law
 from notchflex.mechanics.motion import IN_PLANE, Motion, rotation_about
 from notchflex.mechanics.ring import Side
-from notchflex.mechanics.section import FIBRES, fitted, gauss_on, half_angle
+from notchflex.mechanics.section import FIBRES, fitted
 from notchflex.mechanics.sheath import Sheath, build_sheath
 from notchflex.mechanics.tendon import TUBE_AXIS, TendonGroup, route
 from notchflex.robot import Fatigue, Robot, Tendon, Tube
-from notchflex.robot.cuts import NotchCut
 from notchflex.robot.kinds import Notch
 from notchflex.robot.part import unchecked
 
@@ -237,116 +236,6 @@ def padded(chain: Chain, flexures: int, edges: int) -> Chain:
         **{name: longer(getattr(chain, name)) for name in others},
         **{k: np.pad(v, [(0, more)] + [(0, 0)] * (v.ndim - 1)) for k, v in bodies.items()},
     )
-
-
-# Masses of the pieces of a robot: uncut tube, and the sections that the notches leave.
-
-
-def body_lengths(tube: Tube, notches: Sequence[Notch]) -> Float[Array, " bodies"]:
-    """Return the length of each rigid piece on the tube axis, base first, mm."""
-    following = (*notches[1:], None)
-    spacings = (notch.spacing(after) for notch, after in zip(notches, following, strict=True))
-    return xp.stack(xp.broadcast_arrays(tube.base_length, *spacings))
-
-
-@cached(1024)
-def _beside_strip(
-    notch: Notch, tubes: tuple[Tube, Tube], before: Notch | None, after: Notch | None
-) -> Float[Array, "2 2"]:
-    """Return volumes, and their moments, of the wall before a strip across the tube and behind."""
-    if not notch.is_strip:
-        return xp.zeros((2, 2))
-    layout = notch.cut_layout(tubes[1], before, after)
-    assert layout is not None
-    radii, cuts = xp.array([[tubes[1].outer_radius], [tubes[1].inner_radius]]), layout.cuts
-    ring = np.pi * (radii[0, 0] ** 2 - radii[1, 0] ** 2)
-    earlier = before and before.is_strip and before.cut_layout(tubes[0], None, notch)
-    if earlier:  # its last cut may reach into this length of tube
-        cuts += (earlier.cuts[-1].moved(-earlier.length),)
-
-    def taken(cut: NotchCut, along: Array) -> Array:
-        """Compute the area that a cut takes of the tube's wall."""
-        places, heights = xp.array(cut.corners).T
-        # A face across the tube is passed where it stands.
-        passed = (along[:, None] - places[:-1] + 1e-99) / xp.maximum(xp.diff(places), 1e-99)
-        bottom = heights[0] + xp.clip(passed, 0.0, 1.0) @ xp.diff(heights)
-        # Beside its ends the bottom of a cut rises by the rounding of its corners.
-        radius = xp.array(cut.radii).max()
-        inside = xp.maximum(radius - xp.minimum(along - places[0], places[-1] - along), 0.0)
-        bottom = bottom + radius - xp.sqrt(xp.maximum(radius**2 - inside**2, 1e-300))
-        # Beyond that chord lies a segment of a circle less one of the bore.
-        angle = half_angle(radii, radii - bottom, radii + bottom)
-        segments = radii**2 * (angle - 0.5 * xp.sin(2.0 * angle))
-        return segments[0] - segments[1]
-
-    def left(low: Any, high: Any) -> Array:
-        def within(place: Any) -> Any:  # the cut's own end where they are equal, for slopes
-            place = xp.where(place > low, place, low)
-            return xp.where(place > high, high, place)
-
-        moments = ring * xp.stack([high - low, 0.5 * (high - low) ** 2])
-        for number, cut in enumerate(cuts):
-            along, weights = gauss_on(within(cut.corners[0][0]), within(cut.corners[-1][0]), 24)
-            area = taken(cut, along)
-            if number == len(layout.cuts):
-                # What the first cut has taken already: of thin walls exact for cuts from any
-                # sides, of others for those from one side and from opposite ones.
-                other = taken(cuts[0], along)
-                turn = xp.abs((cut.side_deg - cuts[0].side_deg + 180.0) % 360.0 - 180.0) / 180.0
-                both = 0.5 * (area + other)
-                shared = xp.clip(both - 0.5 * ring * turn, 0.0, xp.minimum(area, other))
-                area = area - shared - xp.maximum(both - ring * (1.0 - 0.5 * turn), 0.0)
-            moments = moments - xp.stack([area @ weights, area @ (weights * (along - low))])
-        return moments
-
-    face = layout.length - notch.spacing(after)
-    return xp.stack([left(0.0, face), left(face, layout.length)])
-
-
-def body_masses(
-    robot: Robot, rods: Rod
-) -> tuple[Float[Array, " bodies"], Float[Array, "bodies 3"]]:
-    """Compute mass and centre of mass of each body, with its share of the notches."""
-    # A body is a piece of uncut tube: the area of the tube's wall times the body's axial length,
-    # its centre halfway on the tube axis. Only bodies carry loads, so the mass of each flexure
-    # (area of its sections times the length of the neutral axis) is lumped: half at the start of
-    # the neutral axis on the body before it, half at its end on the body after it. A strip across
-    # the tube belongs to the body behind it, with all that its cuts leave of the wall there; what
-    # they leave before the strip belongs to the body before.
-    length = body_lengths(robot.tube, robot.notches)
-    masses = [None, *(notch.mass for notch in robot.notches)]
-    if robot.densities is None and all(mass is None for mass in masses):
-        return xp.zeros(len(length)), xp.zeros((len(length), 3))
-    # Where no density is known, disks of a known mass count alone.
-    densities = robot.densities or (1.0,)
-    # Volumes count as those of the robot's material.
-    relative = xp.array([each / densities[0] for each in robot.densities or [0.0] * len(length)])
-    radii = [(tube.outer_radius, tube.inner_radius) for tube in robot.tubes]
-    outer, inner = xp.array(radii).T
-    around = (None, *robot.notches, None)
-    tubes = pairwise(robot.tubes)
-    walls = xp.stack([*map(_beside_strip, robot.notches, tubes, around, around[2:])])
-    is_strip = np.array([notch.is_strip for notch in robot.notches])
-    piece = np.pi * (outer**2 - inner**2) * length * relative
-    piece = xp.where(np.append(False, is_strip), 0.0, piece)
-    if any(mass is not None for mass in masses):
-        given = [piece[k] if m is None else 1e6 * m / densities[0] for k, m in enumerate(masses)]
-        piece = xp.stack(xp.broadcast_arrays(*given))
-    half = 0.5 * xp.sum(rods.section.area * rods.length, axis=-1) * relative[1:]
-    # The weight of a backbone turns its ends as a beam's does (w L^2/12): a sixth of L inside them.
-    is_round = xp.array([float(notch.is_round) for notch in robot.notches])
-    inside = (is_round * xp.sum(rods.length, axis=-1) / 6.0)[:, None] * TUBE_AXIS
-    end = -xp.einsum("nba,nb->na", rods.end_rotation, rods.end_offset)
-    # Every body has a volume: where no tube is left between two notches, half of each flexure.
-    volume, moment = piece, (0.5 * length * piece)[:, None] * TUBE_AXIS
-    places = (rods.start_offset + inside, length[:-1]), (end - inside, 0.0)
-    for side, (place, origin) in enumerate(places):
-        wall, first = walls[:, side].T * relative[1:]
-        on_axis = (first + origin * wall)[:, None] * TUBE_AXIS
-        first = xp.where(is_strip[:, None], on_axis, half[:, None] * place)
-        volume = volume + xp.pad(xp.where(is_strip, wall, half), (side, 1 - side))
-        moment = moment + xp.pad(first, ((side, 1 - side), (0, 0)))
-    return 1e-6 * densities[0] * volume, moment / xp.where(volume > 0.0, volume, 1.0)[:, None]
 
 
 # Whether a robot stays in one plane under its tendons alone.
