@@ -3,6 +3,8 @@
 How many a second that makes is measured by `benchmarks/control.py viewer`.
 """
 
+from collections import OrderedDict
+
 import numpy as np
 import pytest
 
@@ -26,6 +28,22 @@ def test_updates_compile_nothing_anew():
             update(float(tension))
         assert viewer.message == ""
         assert len(viewer.session.history) == 82
+        assert set(Native.programs) == programs
+    finally:
+        viewer.server.stop()
+
+
+def test_the_first_drag_compiles_nothing(monkeypatch):
+    pytest.importorskip("viser", reason="the extra `viewer` is not installed")
+    from notchflex.viewer import Viewer
+
+    monkeypatch.setattr(Native, "programs", OrderedDict())  # whatever other tests have compiled
+    viewer = Viewer(nf.load_robot("pacheco2021-a"), port=18186)
+    try:
+        viewer.show("handle", True)
+        programs = set(Native.programs)
+        viewer.steer(viewer.session.state.tip_position + [0.1, 0.0, -0.1])
+        assert viewer.session.controls.value[0] > 0.0
         assert set(Native.programs) == programs
     finally:
         viewer.server.stop()

@@ -190,6 +190,7 @@ def _add_drive(viewer: Viewer, tendon: int, count: int) -> Follow:
     def now(label: str) -> None:  # so that the next value belongs to the new choice
         slider.prescribe(_BY[label])
         slider.put(viewer.session.where(tendon, slider.by))
+        end.put(slider.handle.max)
 
     handle = gui.add_dropdown(f"tendon{of} by", tuple(_BY))
     slider = Slider(viewer, tendon, viewer.session.controls.by[tendon])

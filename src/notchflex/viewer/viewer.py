@@ -253,7 +253,9 @@ class Viewer:
         setattr(self.shown, name, value)
         if name == "handle" and value:  # what is compiled now does not hold up the first drag
             self.page.busy("preparing to follow: compiled once, which takes seconds")
-            steer(self.session, self.reach, self.session.state.tip_position)
+            # Elsewhere than at the tip, which is reached without a search.
+            aside = self.session.state.tip_position + self.session.robot.tube.outer_radius
+            steer(self.session, self.reach, aside)
         self._draw()
 
     def _reshape(self, robot: Robot) -> None:
