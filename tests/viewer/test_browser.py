@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import notchflex as nf
+from chromium import PATIENCE
 from notchflex.plotting import LOADING, UNLOADING
 from notchflex.robot import robot_from_text
-from chromium import PATIENCE
 from visit import Visit, changed
 
 image = pytest.importorskip("matplotlib.image")

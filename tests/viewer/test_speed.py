@@ -42,7 +42,7 @@ def test_the_first_drag_compiles_nothing(monkeypatch):
     try:
         viewer.show("handle", True)
         programs = set(Native.programs)
-        viewer.steer(viewer.session.state.tip_position + [0.1, 0.0, -0.1])
+        viewer.steer(viewer.session.state.tip_position + 0.1)
         assert viewer.session.controls.value[0] > 0.0
         assert set(Native.programs) == programs
     finally:

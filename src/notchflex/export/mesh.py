@@ -8,6 +8,7 @@ every tendon. Between two notches the lines go over from their places at one to 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -202,7 +203,7 @@ def mesh_of(robot: Robot, options: DeckOptions, tendons: Sequence[int] = (0,)) -
     sides = [robot.tendon[number].direction_deg for number in tendons]
     first = notches[0].direction_deg
     turns = [side - first for side in (*sides, *(notch.direction_deg for notch in notches))]
-    is_half = all(abs((turn + 180.0) % 360.0 - 180.0) < _SAME for turn in turns)
+    is_half = all(abs(math.remainder(turn, 360.0)) < _SAME for turn in turns)
     radius = np.linspace(robot.tube.inner_radius, robot.tube.outer_radius, 2 * options.wall + 1)
     heights, faces = _layers(robot, notches, options)
     outer = robot.tube.outer_radius

@@ -7,6 +7,7 @@ The zeros of a rod that happens to be straight are not structural.
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -269,7 +270,7 @@ def tendons_in_plane(robot: Robot) -> bool:
 
 def _is_turned(direction_deg: float, other_deg: float) -> bool:
     """Return whether two directions differ by more than the rounding of sums of angles."""
-    return abs((direction_deg - other_deg + 180.0) % 360.0 - 180.0) > 1e-6
+    return abs(math.remainder(direction_deg - other_deg, 360.0)) > 1e-6
 
 
 def tip_anchor(robot: Robot) -> Any:

@@ -1,5 +1,6 @@
 """Lengths and masses of the bodies of a robot: uncut tube, disks, and what the notches leave."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -27,8 +28,6 @@ def _beside_strip(
     notch: Notch, tube_before: Tube, tube: Tube, before: Notch | None, after: Notch | None
 ) -> Float[Array, "2 2"]:
     """Return volumes, and their moments, of the wall before a strip across the tube and behind."""
-    if not notch.is_strip:
-        return xp.zeros((2, 2))
     layout: Any = notch.cut_layout(tube, before, after)
     radii, (opening, *behind) = xp.array([[tube.outer_radius], [tube.inner_radius]]), layout.cuts
     ring = np.pi * (radii[0, 0] ** 2 - radii[1, 0] ** 2)
@@ -65,7 +64,7 @@ def _beside_strip(
                 # sides, of others for those from one side and from opposite ones.
                 other = taken(cuts[0], along)
                 mean, turn = 0.5 * (area + other), cut.side_deg - cuts[0].side_deg
-                apart = ring / 360.0 * xp.abs((turn + 180.0) % 360.0 - 180.0)
+                apart = ring / 360.0 * abs(math.remainder(turn, 360.0))
                 shared = xp.clip(mean - apart, 0.0, xp.minimum(area, other))
                 area = area - shared - xp.maximum(mean + apart - ring, 0.0)
             moments = moments - xp.stack([area @ weights, area @ (weights * (along - low))])
@@ -92,8 +91,9 @@ def body_masses(
         return xp.zeros(len(length)), xp.zeros((len(length), 3))
     # Where no density is known, disks of a known mass count alone.
     density = 1e-6 * xp.array(robot.densities or [0.0] * len(length))  # g/mm³
-    around = (None, *notches, None)
-    walls = xp.stack([*map(_beside_strip, notches, tubes, tubes[1:], around, around[2:])])
+    around, none = (None, *notches, None), np.zeros((2, 2))
+    neighbours = zip(notches, tubes[:-1], tubes[1:], around[:-2], around[2:], strict=True)
+    walls = xp.stack([_beside_strip(*each) if each[0].is_strip else none for each in neighbours])
     is_strip = np.array([False, *(notch.is_strip for notch in notches)])
     rings = [tube.outer_radius**2 - tube.inner_radius**2 for tube in tubes]
     piece = xp.where(is_strip, 0.0, np.pi * xp.array(rings) * length * density)
