@@ -37,7 +37,7 @@ def sums(load, *, robot=ROBOT, mass=None, centre=None) -> BodyLoads:
         body_length=LENGTH,
         frame=None,
         loaded=True,
-        law=SimpleNamespace(starts_at=None),
+        temperature=None,
         sheath=None,
     )
     command = make_commands(load_path(load, robot.number_of_tendons), robot, chain)

@@ -176,18 +176,16 @@ class Chains:
         return self.programs.gradient(self.form.table(robots), weights, 1.0 * self.form.units)
 
     def bodies(self, chains: Float[np.ndarray, "k chain"]) -> Chain:
-        """Return the chain with the masses and lengths of the bodies of every robot, for loads."""
+        """Return the chain with the masses, lengths and temperature of every robot, for loads."""
         if chains.ndim == 1 or not self.ready.chain.loaded:
             return self.ready.chain
         indices: Chain = self.structure.form.unpack_indices()
-        names = ("body_length", "body_mass", "body_centre")
+        names = ("body_length", "body_mass", "body_centre", "temperature")
         values: dict[str, Any] = {
-            name: chains[:, self.structure.indices_of(getattr(indices, name))] for name in names
+            name: chains[:, self.structure.indices_of(places)]
+            for name in names
+            if (places := getattr(indices, name)) is not None
         }
-        of_temperature: Any = indices.law.starts_at
-        if of_temperature is not None:
-            temperature: Any = chains[:, self.structure.indices_of(of_temperature)]
-            values["law"] = dataclasses.replace(self.ready.chain.law, temperature=temperature)
         return dataclasses.replace(self.ready.chain, **values)
 
 

@@ -89,7 +89,7 @@ def body_numbers(chain: Chain) -> tuple[Any, ...]:
     """Return what loads take of a robot: masses, their moments, place of the tip, temperature."""
     mass = np.asarray(chain.body_mass)
     moment = mass[..., None] * np.asarray(chain.body_centre)
-    return mass, moment, np.asarray(chain.body_length)[..., -1], chain.law.starts_at
+    return mass, moment, np.asarray(chain.body_length)[..., -1], chain.temperature
 
 
 def load_slopes(load: LoadPath, chain: Chain, change: Chain) -> BodyLoads:
@@ -99,7 +99,7 @@ def load_slopes(load: LoadPath, chain: Chain, change: Chain) -> BodyLoads:
     by_moment = by_mass[..., None] * centre + mass[:, None] * np.asarray(change.body_centre)
     by_tip = np.asarray(change.body_length)[..., -1]
     steps = np.broadcast_to(np.arange(len(load)), (len(by_tip), len(load)))
-    by = by_mass, by_moment, by_tip, change.law.starts_at
+    by = by_mass, by_moment, by_tip, change.temperature
     none = jax.tree.map(np.zeros_like, by)
     changed, still = (applied(load, chain, steps, bodies) for bodies in (by, none))
     return jax.tree.map(operator.sub, changed, still)

@@ -56,6 +56,8 @@ class Chain(Pytree):
     # tube axis at its proximal face
     rods: Rod
     law: Law  # The material, or the materials of the flexures
+    # Temperature from which loads warm the one that moves with it, deg C; None where none does
+    temperature: Float[Array, ""] | None
     friction: FrictionLaw  # The friction between tendons and tube
     groups: tuple[TendonGroup, ...]  # The tendons, by the way they run
     contact_pairs: tuple[ContactGroup, ...]  # The contacts that close notches, by kind
@@ -485,6 +487,7 @@ def _of_materials(robot: Robot, template: ChainTemplate) -> dict[str, Any]:
         sections = [jax.tree.map(operator.itemgetter(k), rods.section) for k in range(len(laws))]
         stiffness = xp.stack([*map(Law.stiffness, laws, sections)])
         law = MixedLaw.of(laws)
+    used_at = (getattr(source, "used_at", None) for source in sources)
     weighted = rods.length[..., None, None] * (stiffness @ rods.basis)
     elastic = xp.einsum("niam,niak->nmk", rods.basis, weighted)
     elastic = elastic + rods.padding_mask[:, None] * xp.eye(rods.modes)
@@ -495,6 +498,7 @@ def _of_materials(robot: Robot, template: ChainTemplate) -> dict[str, Any]:
     contact_stiffness = 1.0 / xp.sum(template.contact_motion / stiffness, axis=-1)
     return {
         "law": law,
+        "temperature": next((constant(at) for at in used_at if at is not None), None),
         "stiffness": stiffness,
         "elastic": elastic if linear else None,
         "contact_stiffness": contact_stiffness,

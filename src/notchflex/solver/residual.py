@@ -305,7 +305,7 @@ def unloaded(chain: Chain) -> BodyLoads | None:
         return None
     bodies = chain.flexures + 1
     d, a = (3, 3) if chain.frame is None else (2, 1)
-    shapes = ((d,), (a,), (d, d), (a + d,), *[()] * (chain.law.starts_at is not None))
+    shapes = ((d,), (a,), (d, d), (a + d,), *[()] * (chain.temperature is not None))
     return BodyLoads(*(constant(np.zeros((bodies, *shape))) for shape in shapes))
 
 

@@ -29,8 +29,8 @@ from notchflex.mechanics.material.law import (
     SectionEnds,
     SectionLaw,
     moduli,
+    moves_of,
     section_law,
-    temperature_of,
 )
 from notchflex.robot import Nitinol, StressStrain
 
@@ -329,8 +329,8 @@ def _(material: Nitinol) -> FibreLaw:
         length = material.transformation_strain - material.plateau_stress / modulus
         low, high = xp.hstack([low, low - length]), xp.hstack([high, high + length])
         change = xp.append(change, -change)
-    by_kelvin = temperature_of(material, -ratio, 1.0)
-    return FibreLaw(*moduli(material), *map(constant, (low, high, change)), **by_kelvin)
+    moves = moves_of(material, [[-ratio]], [[1.0]])
+    return FibreLaw(*moduli(material), *map(constant, (low, high, change)), moves=moves)
 
 
 # A curve of stress over strain: each of its points is a kink.

@@ -344,16 +344,15 @@ class Law(Pytree):
     is_linear: ClassVar[bool] = False
     axis: ClassVar[int | None] = None
     lumped: ClassVar[bool] = False
-    moving: ClassVar[tuple[str, str]]
+    moving: ClassVar[tuple[str, ...]] = ()
     respond: ClassVar[Callable[..., SectionResponse]]
     bent: ClassVar[Callable[..., Bending]]
     elastic: ClassVar[Callable[..., Strain]]
     tangent: ClassVar[Callable[..., Strain]]
     covers: ClassVar[Callable[..., Array]]
     stored_energy_density: ClassVar[Callable[..., tuple[Scalar, Flattening]]]
-    # Temperature, deg C, and how far the strains of the law move with it, 1/K; None where they stay
-    temperature: Scalar | None = dataclasses.field(default=None, kw_only=True)
-    moves: Each | None = dataclasses.field(default=None, kw_only=True)
+    # How far each strain of `moving` moves with the temperature, 1/K; () where they stay
+    moves: tuple[Any, ...] = dataclasses.field(default=(), kw_only=True)
 
     @property
     def remembers(self) -> bool:
@@ -368,17 +367,10 @@ class Law(Pytree):
         """Return the energy per length lost between two memories, N mm/mm; for plain arrays."""
         return xp.zeros(xp.shape(section.area))
 
-    @property
-    def starts_at(self) -> Scalar | None:
-        """Temperature from which loads warm it, deg C; None where it does not count."""
-        return self.temperature
-
     def warmed(self, rise: Scalar) -> Self:
         """Return the law at a higher temperature, K; what has transformed stays."""
-        assert self.moves is not None
-        strains = {
-            name: getattr(self, name) + self.moves[k] * rise for k, name in enumerate(self.moving)
-        }
+        pairs = zip(self.moving, self.moves, strict=False)
+        strains = {name: getattr(self, name) + move * rise for name, move in pairs}
         return dataclasses.replace(self, **strains)
 
     def stiffness(self, section: FibreSection) -> Float[Array, "*shape 6 6"]:
@@ -566,19 +558,9 @@ class MixedLaw(Law):
         """Whether any of them does."""
         return any(law.remembers for law in self.laws)
 
-    @property
-    def starts_at(self) -> Scalar | None:
-        """That of the one material which loads may warm, beside tables."""
-        each = (law.temperature[..., 0] for law in self.laws if law.temperature is not None)
-        return next(each, None) if self.temperature is None else self.temperature
-
     def warmed(self, rise: Scalar) -> Self:
         """Return the laws at a higher temperature, K."""
-        laws = (
-            law if law.moves is None else jax.vmap(type(law).warmed, (0, None))(law, rise)
-            for law in self.laws
-        )  # fmt: skip
-        return dataclasses.replace(self, laws=tuple(laws))
+        return dataclasses.replace(self, laws=tuple(law.warmed(rise) for law in self.laws))
 
     def rest(self, section: FibreSection) -> Any:
         """Return the memory of free sections, which serves all laws that remember."""
@@ -607,13 +589,13 @@ def moduli(material: Any) -> tuple[Array, Array]:
     return modulus, modulus / (2.0 * (1.0 + material.poisson_ratio))
 
 
-def temperature_of(material: Any, *sides: Any) -> dict[str, Array]:
-    """Return temperature and moves of a law whose strains move by shares (`sides`) of a stress."""
+def moves_of(material: Any, *sides: Any) -> tuple[Array, ...]:
+    """Return the moves of a law whose strains move by shares (`sides`) of a stress."""
     # Clausius and Clapeyron: the stress of a transformation changes in proportion to temperature.
     if material.reference_temperature is None:
-        return {}
-    moves = material.stress_per_kelvin / material.elastic_modulus * xp.stack(sides)
-    return {"temperature": constant(material.used_at), "moves": constant(moves)}
+        return ()
+    by_kelvin = material.stress_per_kelvin / material.elastic_modulus
+    return tuple(constant(by_kelvin * xp.array(side)) for side in sides)
 
 
 @singledispatch

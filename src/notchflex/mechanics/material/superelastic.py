@@ -20,8 +20,8 @@ from notchflex.mechanics.material.law import (
     Scalar,
     SectionLaw,
     moduli,
+    moves_of,
     section_law,
-    temperature_of,
 )
 from notchflex.robot import Superelastic
 
@@ -91,4 +91,4 @@ def _(material: Superelastic) -> SuperelasticLaw:
     strains = material.transition_strain + shift, material.plastic_strain + shift
     others = material.plastic_modulus, material.plastic_exponent
     numbers = map(constant, (material.superelastic_modulus, *strains, *others))
-    return SuperelasticLaw(*moduli(material), *numbers, **temperature_of(material, 1.0, 1.0))
+    return SuperelasticLaw(*moduli(material), *numbers, moves=moves_of(material, 1.0, 1.0))
