@@ -1,6 +1,5 @@
 """Nitinol with a plateau, and an unloading plateau where it is known."""
 
-import math
 from dataclasses import KW_ONLY, replace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -149,23 +148,23 @@ class TensileTest:
             InputError: No material with these moduli gives these stresses.
         """
         form = Nitinol(**keys)
-        hardening = form.plateau_modulus
-        share = 1.0 - hardening / form.elastic_modulus
-        plateaus = [
-            None if stress is None else (stress - hardening * strain) / share
+        modulus, hardening = form.elastic_modulus, form.plateau_modulus
+        upper, unloading = (
+            stress and (stress - hardening * strain) / (1.0 - hardening / modulus)
             for stress, strain in (
                 (self.upper_plateau, _LOADED),
                 (self.lower_plateau, _UNLOADED),
             )
-        ]
-        loading, unloading = plateaus[0] or form.plateau_stress, plateaus[1]
+        )
+        loading = upper or form.plateau_stress
+        lowest = unloading or loading
         # Both stresses lie on plateaus: behind the elastic lines from zero and from 6 %.
-        last = min(_REVERSED, form.transformation_strain or math.inf)
-        reached = last - (loading - (unloading or loading)) / form.elastic_modulus
-        begins = 0.0 < loading < _LOADED * form.elastic_modulus and (unloading or loading) > 0.0
+        begins = 0.0 < lowest <= loading < _LOADED * modulus
+        last = min(_REVERSED, form.transformation_strain or _REVERSED)
+        reached = last - (loading - lowest) / modulus
         if not (begins and last > _LOADED and reached > _UNLOADED):
             raise InputError.INVALID_ROBOT(
-                f"TensileTest: with an elastic_modulus of {form.elastic_modulus:g} MPa and a "
+                f"TensileTest: with an elastic_modulus of {modulus:g} MPa and a "
                 f"plateau_modulus of {hardening:g} MPa no material has an upper_plateau of "
                 f"{self.upper_plateau} and a lower_plateau of {self.lower_plateau}; are all in MPa?"
             )
