@@ -202,24 +202,22 @@ class Interview:
         tendons = self._tendons(tube, notches)
         material = self._kind(Material)
         plastic = {"lt": 0.1}  # where the plastic branch begins
-        test = self._tensile_test(material)
-        given = [] if test is None else ["plateau_stress"]
+        make, given = self._made_by(material)
         values = self._keys("material", material, but=given, transition_strain=plastic)
-        make = material if test is None else test.nitinol
         friction = self._kind(Friction, asks=self.person)
         of_friction = self._keys("friction", friction)
         return Robot(title, tube, notches, tendons, make(**values), friction(**of_friction))
 
-    def _tensile_test(self, material: type) -> TensileTest | None:
-        """Ask for what a data sheet of nitinol prints; None where there is none."""
-        if material is not Nitinol or self._options["--plateau-stress"] is not None:
-            return None
-        (first, *more) = keys_of(TensileTest)
-        values = self._keys("material", TensileTest, first)
-        if values[first] is None:
-            return None
-        self.answered |= {f"material.{key}" for key in ("plateau_stress", "unloading_stress")}
-        return TensileTest(**values, **self._keys("material", TensileTest, *more))
+    def _made_by(self, material: type) -> tuple[Any, list[str]]:
+        """Return what makes a material of its keys, and those that a data sheet has given."""
+        if material is Nitinol and self._options["--plateau-stress"] is None:
+            (first, *more) = keys_of(TensileTest)
+            values = self._keys("material", TensileTest, first)
+            if values[first] is not None:
+                self.answered |= {"material.plateau_stress", "material.unloading_stress"}
+                test = TensileTest(**values, **self._keys("material", TensileTest, *more))
+                return test.nitinol, ["plateau_stress"]
+        return material, []
 
     def _notches(self, tube: Tube) -> tuple[Notch, ...]:
         """Ask for the number of notches, and for their keys: one value, or each its own."""
