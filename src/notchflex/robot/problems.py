@@ -387,19 +387,20 @@ def robot_warnings(robot: "Robot") -> Iterator[InputWarning]:
                 by_unit.setdefault((unit_of(field), other), []).append(unusual)
     for (unit, other), values in by_unit.items():
         yield _outside(values, unit, other)
-    for named in named_parts(robot):
-        own = f"{named.name}.material", getattr(named.part, "material", None)
-        for name, part in ((named.name, named.part), own):
-            yield from too_cold(part, f"{name}.temperature", getattr(part, "used_at", None))
+    parts = ((f"{named.name}.", named.part) for named in named_parts(robot))
+    for name, part in (*parts, ("", robot)):
+        material = getattr(part, "material", None)
+        used_at = getattr(material, "used_at", None)
+        yield from too_cold(material, f"{name}material.temperature", used_at)
     if not by_unit:
         yield from _narrow_channels(robot)
         yield from _remaining_depths(robot)
 
 
-def too_cold(material: Any, name: str, temperature: float | None) -> Iterator[InputWarning]:
+def too_cold(material: Any, name: str, temperature: Any) -> Iterator[InputWarning]:
     """Warn of a temperature below the austenite finish, where both are known."""
-    finish = getattr(material, "austenite_finish", None)
-    if finish is not None and temperature is not None and temperature < finish:
+    finish: Any = getattr(material, "austenite_finish", None)
+    if None not in (finish, temperature) and temperature < finish:
         text = (
             f"`{name}` is {_shown(temperature, 'deg C')}, below the austenite finish, "
             f"{_shown(finish, 'deg C')}: the material is not superelastic there, and no number of "
