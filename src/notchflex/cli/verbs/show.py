@@ -95,11 +95,10 @@ def _at_temperatures(robot: Robot) -> Iterator[dict[str, Any]]:
 
     from notchflex import closing
 
-    places = ["material.temperature"] * _warms(robot.material)
-    places += [
-        f"notch[{number}].material.temperature"
-        for number, notch in enumerate(robot.notches, start=1)
-        if _warms(notch.material)
+    places = [
+        f"notch[{number}].material.temperature" if number else "material.temperature"
+        for number, part in enumerate((robot, *robot.notches))
+        if getattr(part.material, "reference_temperature", None) is not None
     ]
     for temperature in (22.0, 37.0) if places else ():
         try:
@@ -110,17 +109,14 @@ def _at_temperatures(robot: Robot) -> Iterator[dict[str, Any]]:
         tension = closing(warm).tension
         materials = [notch.made_of(warm.material) for notch in warm.notches]
         different = dict.fromkeys(materials)
-        for material in filter(_warms, different):
-            members = [k for k, other in enumerate(materials) if other == material]
-            of = {"notches": ", ".join(str(k + 1) for k in members)} if len(different) > 1 else {}
+        for material in different:
+            if getattr(material, "temperature", None) != temperature:
+                continue
+            members = np.flatnonzero([other == material for other in materials])
+            of = {"notches": ", ".join(map(str, members + 1))} if len(different) > 1 else {}
             row = zip(("plateau_MPa", "lower_plateau_MPa"), material.plateaus, strict=False)
             ends = [function.reduce(tension[members]) for function in (np.fmin, np.fmax)]
             yield {"temperature_C": temperature, **of, **dict(row), "closing_tension_N": ends}
-
-
-def _warms(material: Any) -> bool:
-    """Return whether the temperature counts for a material."""
-    return getattr(material, "reference_temperature", None) is not None
 
 
 def _print(robot: Robot, title: str, notches: list[dict[str, Any]]) -> None:
