@@ -55,6 +55,7 @@ _HOME = {
         "notchflex.analysis.geometry": ("FlexureShape",),
         "notchflex.analysis.slopes": ("changes", "derivatives", "load_change"),
         "notchflex.analysis.tangent": ("Change",),
+        "notchflex.loads.command": ("check_external",),
         "notchflex.loads.load": (
             "ExternalLoad",
             "check_integer",

@@ -33,6 +33,7 @@ from notchflex.analysis.slopes import changes as changes
 from notchflex.analysis.slopes import derivatives as derivatives
 from notchflex.analysis.slopes import load_change as load_change
 from notchflex.analysis.tangent import Change as Change
+from notchflex.loads.command import check_external as check_external
 from notchflex.loads.load import ExternalLoad as ExternalLoad
 from notchflex.loads.load import check_integer as check_integer
 from notchflex.loads.load import check_is_robot as check_is_robot

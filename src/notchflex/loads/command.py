@@ -70,18 +70,18 @@ def applied(
     axes = along, about, world_along, world_about
     by_row = masses[2].ndim
     fields: list[np.ndarray] = []
-    rise = np.zeros(steps.size)
+    rise = np.zeros((steps.size, masses[0].shape[-1]))
     for external, places, at_tip in _each(load, steps, tip):
         rows = places // steps.shape[-1] if by_row else np.s_[...]
-        if warm is not None and external.temperature is not None:
-            rise[places] = external.temperature - warm[rows]
+        if external.temperature is not None:
+            rise[places] = external.temperature - warm[rows][..., None]
         sums = _sums(external, axes, *(each[rows] for each in masses), at_tip=at_tip)
         shapes = [values.shape[by_row if tip is None else 1 :] for values in sums]
         fields = fields or [np.empty((steps.size, *shape)) for shape in shapes]
         for field, values in zip(fields, sums, strict=True):
             field[places] = values
     if warm is not None:
-        fields.append(np.repeat(rise[:, None], fields[0].shape[1], axis=1))
+        fields.append(rise)
     return BodyLoads(*(constant(field.reshape(*steps.shape, *field.shape[1:])) for field in fields))
 
 
@@ -220,7 +220,7 @@ def acting(
         )
     kinds = LoadKind.DRAWN * ~np.isnan(load.stroke[steps]).all(axis=-1).ravel()
     for external, places, at_tip in _each(load, steps, tip):
-        _check(external, robot)
+        check_external(external, robot)
         pushed = np.any(at_tip, axis=0)
         kinds[places] += (
             LoadKind.LOADED * (pushed | (not external.is_nothing))
@@ -283,11 +283,12 @@ def _of_plane(frame: Float[Array, "3 3"]) -> tuple[np.ndarray, np.ndarray]:
     return axes[:, IN_PLANE], axes[:, 1:2]
 
 
-def _check(external: ExternalLoad, robot: Robot) -> None:
+def check_external(external: ExternalLoad, robot: Robot) -> None:
+    """Refuse external loads that have nothing to act on in a robot."""
     last = robot.number_of_notches
     if external.temperature is not None:
-        laws = {notch.made_of(robot.material) for notch in robot.notches}
-        warm = [material for material in laws if isinstance(material, Transforming)]
+        made_of = {notch.made_of(robot.material) for notch in robot.notches}
+        warm: list[Any] = [each for each in made_of if isinstance(each, Transforming)]
         if len(warm) > 1:
             raise InputError.UNSUPPORTED(
                 f"a load cannot give {robot.name} a temperature, as several of its materials have "
@@ -300,7 +301,7 @@ def _check(external: ExternalLoad, robot: Robot) -> None:
                 "its material was measured; give material.reference_temperature (deg C), which "
                 "nitinol and superelastic have"
             )
-        replace(cast("Any", warm[0]), temperature=external.temperature)  # raises if too cold
+        replace(warm[0], temperature=external.temperature)  # raises if too cold
     for force in external.body_forces:
         if force.body > last:
             raise InputError.OUT_OF_RANGE(
@@ -417,7 +418,7 @@ def make_commands(load: LoadPath, robot: Robot, chain: Chain) -> Command:
     by_stroke = ~np.isnan(load.stroke) if draws else None
     if chain.loaded:
         for distinct in load.different:
-            _check(distinct, robot)
+            check_external(distinct, robot)
         external = applied(load, chain, np.arange(len(load)))
     return Command(cast("Any", load.target), cast("Any", by_stroke), external, _bends(load, chain))
 

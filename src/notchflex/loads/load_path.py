@@ -323,8 +323,10 @@ class LoadPath(ByValue, Displayed):
                     "or one for each step"
                 ) from None
             path = self[steps]
-            warm = zip(path.external, each.tolist(), strict=True)
-            loads = [replace(load, **changes | {"temperature": value}) for load, value in warm]
+            loads = (
+                replace(load, **changes | {"temperature": value})
+                for load, value in zip(path.external, each.tolist(), strict=True)
+            )
             return replace(path, external=tuple(loads))
         # Each distinct load is made and checked once.
         changed = [replace(load, **changes) for load in self.different]

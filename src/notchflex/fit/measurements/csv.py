@@ -21,6 +21,7 @@ from notchflex.support import (
     AnyPath,
     ExternalLoad,
     Table,
+    check_external,
     check_is_path,
     check_is_robot,
     check_pulls,
@@ -241,14 +242,9 @@ class MeasurementReader:
                 if bends is not None and not np.isnan(bends[row]):
                     tip[_BEND] = round(np.degrees(bends[row]), 9)  # as it stands in the file
                 load = ExternalLoad(**tip, body_forces=forces)
+                check_external(load, self.robot)
             except InputError as problem:
                 raise InputError(f"{place}: {problem}.", problem.code) from None
-            has_mass = self.robot.densities is not None or load.tip_mass
-            if any(load.gravity or ()) and not has_mass:
-                raise InputError.UNSUPPORTED(
-                    f"{place}: gravity has nothing to act on, because the density of "
-                    f"{self.robot.name} is not known; give material.density, or a tip_mass_g."
-                )
             loads.append(load)
         return tuple(loads)
 
