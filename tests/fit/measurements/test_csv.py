@@ -208,6 +208,13 @@ def test_gravity_needs_something_to_act_on(read, robot):
         read(text, bare)
 
 
+def test_a_temperature_needs_the_one_of_the_measured_material(read, robot):
+    text = "tendon_force_N,temperature_C,total_deg\n1,37,1\n"
+    with refused("UNSUPPORTED", "line 2: temperature has no effect"):
+        read(text)
+    assert len(read(text, robot.with_value("material.reference_temperature", 22.0))) == 1
+
+
 def everything(robot: nf.Robot, path: nf.LoadPath, **options) -> Measurements:
     return simulate_measurements(
         robot,
